@@ -1,4 +1,5 @@
-// narpa bench atmosphere - shells, steps, tables and wavelengths of the air against their error and time.
+// narpa bench atmosphere - error and time of the atmosphere against its numbers of shells, steps, table entries and
+// wavelengths.
 #include <fmt/format.h>
 
 #include <array>
@@ -20,7 +21,7 @@ nlohmann::json air_rows(const std::vector<AirErrorRow>& rows, const char* settin
     for (const AirErrorRow& r : rows)
         out.push_back({{setting, r.setting},
                        {"error", r.rms},
-                       {"error_most", r.most},
+                       {"error_max", r.most},
                        {"time_s", r.time_s},
                        {"bytes", r.bytes},
                        {"default", r.is_default}});

@@ -10,9 +10,9 @@
 #include "apps/scene_options.h"
 #include "bench/approach.h"
 #include "bench/cold.h"
+#include "bench/consistency.h"
+#include "bench/consistency_scenes.h"
 #include "bench/filter.h"
-#include "bench/honesty.h"
-#include "bench/honesty_scenes.h"
 #include "bench/icp.h"
 #include "bench/pnp.h"
 #include "bench/statistics.h"
@@ -32,18 +32,18 @@ struct EstimateBenchOptions {
     double turn_deg_s = 0;
     PnpBenchOptions pnp;
     ApproachOptions approach;
-    HonestyOptions honesty;
+    ConsistencyOptions consistency;
     ColdOptions cold;
     int first_trial = 0;
     std::string model_error, told;
 };
 
-/// What the parts put together: what is wrong, and what goes on the plot of all.
+/// Results of all parts: what failed, and the points of the summary plot.
 struct Findings {
     std::vector<std::string> faults;
     nlohmann::json estimators = nlohmann::json::array();
 
-    /// `ms`: an estimate, median. `position`: its RMS error, as a part of the range.
+    /// `ms`: median time of one estimate. `position`: RMS position error, as a fraction of the range.
     void add(const std::string& name, const char* family, double ms, double position) {
         estimators.push_back(
             {{"estimator", name}, {"family", family}, {"ms", ms}, {"position_error_of_range", position}});
@@ -53,7 +53,7 @@ struct Findings {
 /// One estimator's part of the bench: prints its results and returns its document.
 using Part = Outcome (*)(const EstimateBenchOptions&, Findings&);
 
-/// Plots where plots are wanted. `document`: what the part found, without its kind and title.
+/// Writes a plot where --plots was given. `found`: the results of the part.
 Status plot(const EstimateBenchOptions& o, const std::string& kind, const std::string& title, const char* key,
             const nlohmann::json& found) {
     if (o.plots.empty()) return Ok{};
@@ -72,7 +72,7 @@ Outcome bench_pnp(const EstimateBenchOptions& o, Findings& findings) {
         },
         stop_flag());
     const PnpVerdict verdict = judge(cells);
-    say(in_words(cells) + in_words(verdict));
+    say(to_text(cells) + to_text(verdict));
     // Times are reported, not judged: the machine may be loaded.
     constexpr double kWorstRms = 1.1;
     if (!o.quick && verdict.worst_rms_bounds > kWorstRms)
@@ -85,7 +85,7 @@ Outcome bench_pnp(const EstimateBenchOptions& o, Findings& findings) {
     if (verdict.cells_with_more_failures > 0)
         findings.faults.push_back(fmt::format("points: more failures than {} in {} cells", kPnpPeerCold,
                                               verdict.cells_with_more_failures));
-    // On the plot of all: thirty points at half a pixel from 30 m, or what is nearest.
+    // The summary plot shows the cell nearest to 30 points, noise of 0.5 px and a range of 30 m.
     const auto distance = [](const PnpCell& c) {
         return std::abs(std::log(c.points / 30.0)) + std::abs(std::log(c.noise_px / 0.5)) +
                std::abs(std::log(c.range_m / 30)) + (c.name == "nominal" ? 0 : 10);
@@ -99,8 +99,8 @@ Outcome bench_pnp(const EstimateBenchOptions& o, Findings& findings) {
     return nlohmann::json{{"cells", to_json(cells)}, {"verdict", to_json(verdict)}};
 }
 
-/// A world as the approach and the LiDAR need it.
-Result<std::unique_ptr<World>> standing_world(const std::string& scene_file, int size) {
+/// The world of the parts `approach` and `lidar`, with images of this size.
+Result<std::unique_ptr<World>> benchmark_world(const std::string& scene_file, int size) {
     auto scene = scene_or_shipped(scene_file, "docking/docking.toml");
     if (!scene) return scene.error();
     for (Camera& c : scene->cameras) resize_longer_side(c, size);
@@ -108,7 +108,7 @@ Result<std::unique_ptr<World>> standing_world(const std::string& scene_file, int
 }
 
 Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
-    auto world = standing_world(o.scene, o.size);
+    auto world = benchmark_world(o.scene, o.size);
     if (!world) return world.error();
     const Scene& scene = (*world)->scene();
     const auto camera = sensor_named(scene.cameras, o.camera, "camera", scene.file);
@@ -129,7 +129,7 @@ Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
     const std::vector<ApproachRun> runs = run_approach(
         **world, *camera, target, options, threads, [&](const std::string& step) { progress.show(step); },
         stop_flag());
-    say(in_words(runs));
+    say(to_text(runs));
     const std::string title = fmt::format("{}: {} from {:g} m to {:g} m", scene.name, scene.bodies[target].name,
                                           options.from_m, options.to_m);
     const nlohmann::json document = to_json(runs);
@@ -156,7 +156,7 @@ Outcome bench_stereo(const EstimateBenchOptions& o, Findings& findings) {
     const int points = o.quick ? 20 : 100;
     const auto stereo = measure_stereo(*scene, points, [&](const std::string& step) { progress.show(step); });
     if (!stereo) return stereo.error();
-    say(in_words(*stereo));
+    say(to_text(*stereo));
     if (!o.quick)
         for (const std::string& fault : stereo_faults(*stereo, points))
             findings.faults.push_back("stereo: " + fault);
@@ -170,7 +170,7 @@ Outcome bench_stereo(const EstimateBenchOptions& o, Findings& findings) {
 }
 
 Outcome bench_icp(const EstimateBenchOptions& o, Findings& findings) {
-    auto world = standing_world("", o.size);
+    auto world = benchmark_world("", o.size);
     if (!world) return world.error();
     const auto target = (*world)->body_named("station");
     if (!target) return Error{"no body \"station\" in the docking scene", (*world)->scene().file};
@@ -181,7 +181,7 @@ Outcome bench_icp(const EstimateBenchOptions& o, Findings& findings) {
     const auto runs = run_icp(**world, *target, starts, [&](int done, int of) {
         progress.show(static_cast<double>(done) / of, fmt::format("start {} of {}", done, of));
     });
-    say(in_words(runs));
+    say(to_text(runs));
     findings.add("ICP of a VLP-16 sweep", "LiDAR", 1e-3 * runs.front().microseconds_p50,
                  runs.front().translation_rms_m / (0.5 * (kIcpDistanceMin_m + kIcpDistanceMax_m)));
     nlohmann::json document = to_json(runs);
@@ -197,7 +197,7 @@ Outcome bench_filter(const EstimateBenchOptions& o, Findings& findings) {
     if (o.quick) settings.runs = 10, settings.seconds = 10;
     const Progress progress("filter");
     const auto runs = run_filter(filter_cases(), settings);
-    say(in_words(runs));
+    say(to_text(runs));
     constexpr double kRange_m = 30;  // of the cases
     for (const FilterRun& run : runs)
         findings.add("filter: " + run.name, "filter", 1e-3 * run.update_microseconds,
@@ -208,8 +208,8 @@ Outcome bench_filter(const EstimateBenchOptions& o, Findings& findings) {
     return document;
 }
 
-Outcome bench_honesty(const EstimateBenchOptions& o, Findings& findings) {
-    HonestyOptions options = o.honesty;
+Outcome bench_consistency(const EstimateBenchOptions& o, Findings& findings) {
+    ConsistencyOptions options = o.consistency;
     auto world = model_uncertainty(o.model_error, "--model-error", &options.distortion);
     if (!world) return world.error();
     auto told = model_uncertainty(o.told, "--told", nullptr);
@@ -217,14 +217,14 @@ Outcome bench_honesty(const EstimateBenchOptions& o, Findings& findings) {
     options.world = *world, options.told = *told;
     if (o.quick) options.trials = 5;
     TracingThreads threads(o.threads);
-    Progress progress("honesty");
-    const auto rows = run_honesty(
+    Progress progress("consistency");
+    const auto rows = run_consistency(
         options, o.first_trial, threads, [&](const std::string& step) { progress.show(step); }, stop_flag());
     if (!rows) return rows.error();
-    say(in_words(*rows));
+    say(to_text(*rows));
     int beyond = 0;
-    for (const HonestyRow& row : *rows) beyond += row.beyond;
-    if (beyond > 0) findings.faults.push_back(fmt::format("honesty: {} good answers beyond 6 sigma", beyond));
+    for (const ConsistencyRow& row : *rows) beyond += row.beyond;
+    if (beyond > 0) findings.faults.push_back(fmt::format("consistency: {} good answers beyond 6 sigma", beyond));
     return to_json(*rows);
 }
 
@@ -243,15 +243,15 @@ Outcome bench_cold(const EstimateBenchOptions& o, Findings& findings) {
         },
         stop_flag());
     if (!trials) return trials.error();
-    say(in_words(*trials));
+    say(to_text(*trials));
     const auto wrong = std::ranges::count_if(*trials, &ColdTrial::wrong);
     if (wrong > 0) findings.faults.push_back(fmt::format("cold: {} good answers are wrong", wrong));
     return to_json(*trials);
 }
 
 constexpr std::pair<const char*, Part> kParts[] = {
-    {"pnp", bench_pnp},       {"approach", bench_approach}, {"stereo", bench_stereo}, {"icp", bench_icp},
-    {"filter", bench_filter}, {"honesty", bench_honesty},   {"cold", bench_cold}};
+    {"pnp", bench_pnp},       {"approach", bench_approach},       {"stereo", bench_stereo}, {"icp", bench_icp},
+    {"filter", bench_filter}, {"consistency", bench_consistency}, {"cold", bench_cold}};
 
 Outcome bench_estimates(const EstimateBenchOptions& o) {
     stop_on_signals();
@@ -335,32 +335,34 @@ Command add_bench_estimate(Parser bench_command) {
         .range(0, 100'000);
     c.option("--basin-range", o->approach.basin_range_m, "approach: m, where starts far off are tried")
         .range(0.01, 1e7);
-    c.option("--honesty-trials", o->honesty.trials, "honesty: frames, sweeps or sets of points of each method")
+    c.option("--consistency-trials", o->consistency.trials,
+             "consistency: frames, sweeps or sets of points of each method")
         .range(1, 1'000'000)
         .shows_default();
-    c.option("--methods", o->honesty.methods, fmt::format("honesty: {}", fmt::join(kHonestyMethods, ", ")))
+    c.option("--methods", o->consistency.methods,
+             fmt::format("consistency: {}", fmt::join(kConsistencyMethods, ", ")))
         .comma_separated()
-        .one_of({kHonestyMethods.begin(), kHonestyMethods.end()})
+        .one_of({kConsistencyMethods.begin(), kConsistencyMethods.end()})
         .type_name("LIST");
-    c.option("--honesty-size", o->honesty.size, "honesty: pixels of the camera's sides")
+    c.option("--consistency-size", o->consistency.size, "consistency: pixels of the camera's sides")
         .range(32, 10'000)
         .shows_default();
-    const auto targets = honesty_targets();
-    c.option("--targets", o->honesty.targets,
-             fmt::format("honesty: {} (default: all of these), or scene files (.toml), whose first body it is",
+    const auto targets = consistency_targets();
+    c.option("--targets", o->consistency.targets,
+             fmt::format("consistency: {} (default: all of these), or scene files (.toml), whose first body it is",
                          fmt::join(targets, ", ")))
         .comma_separated()
         .type_name("LIST");
-    c.option("--conditions", o->honesty.conditions,
-             fmt::format("honesty: {} (default: all)", fmt::join(kHonestyConditions, ", ")))
+    c.option("--conditions", o->consistency.conditions,
+             fmt::format("consistency: {} (default: all)", fmt::join(kConsistencyConditions, ", ")))
         .comma_separated()
-        .one_of({kHonestyConditions.begin(), kHonestyConditions.end()})
+        .one_of({kConsistencyConditions.begin(), kConsistencyConditions.end()})
         .type_name("LIST");
-    c.option("--first-trial", o->first_trial, "honesty: number of the first").range(0, 1'000'000'000);
+    c.option("--first-trial", o->first_trial, "consistency: number of the first").range(0, 1'000'000'000);
     c.option("--model-error", o->model_error,
-             "honesty: errors of the believed model, standard deviations (docs/estimation-accuracy.md)")
+             "consistency: errors of the believed model, standard deviations (docs/estimation-accuracy.md)")
         .type_name("NAME=VALUE,...");
-    c.option("--told", o->told, "honesty: what the estimators are told of it").type_name("NAME=VALUE,...");
+    c.option("--told", o->told, "consistency: what the estimators are told of it").type_name("NAME=VALUE,...");
     c.option("--cold-trials", o->cold.trials, "cold: frames").range(1, 1'000'000).shows_default();
     c.option(
          "--cold-targets", o->cold.targets,

@@ -1,5 +1,5 @@
-// narpa bench render --scenes - the benchmark scenes, one after another; --ablation - what each mechanism earns on
-// them.
+// narpa bench render --scenes - time and error on the benchmark scenes; --ablation - the effect of each rendering
+// technique, switched off in turn.
 #include "apps/bench_ladder.h"
 
 #include <fmt/format.h>
@@ -16,35 +16,35 @@
 namespace narpa::cli {
 namespace {
 
-struct Standing {
+struct BenchmarkScene {
     const char *name, *file, *camera;
     RenderSettings::Method method;
-    int max_depth;          ///< of paths
-    double at_s;            ///< time on the approach; negative: no approach
-    bool loop;              ///< the plain loop can render it
-    double speed_up_least;  ///< over the plain loop at equal error; 0: not judged
-    double speed_up_from;   ///< judged from so many rays a pixel on
-    int size;               ///< px, the longer side
-    bool far = false;       ///< on to 64 samples a pixel, as images converge
+    int max_depth;         ///< of paths
+    double at_s;           ///< time on the approach; negative: no approach
+    bool loop;             ///< the plain loop can render it
+    double speed_up_min;   ///< over the plain loop at equal error; 0: not checked
+    double speed_up_from;  ///< checked from this many rays per pixel on
+    int size;              ///< px, the longer side
+    bool far = false;      ///< up to 64 samples per pixel, to show the convergence
 };
 using Method = RenderSettings::Method;
-constexpr std::array<Standing, 6> kStanding{{
+constexpr std::array<BenchmarkScene, 6> kBenchmarkScenes{{
     {"craft", "craft/craft.toml", "near", Method::direct, 1, -1, true, 2, 0, 512},
     {"craft-paths", "craft/craft.toml", "near", Method::path, 5, -1, true, 3, 16, 256, true},  // four bounces
     {"docking", "docking/docking.toml", "nav", Method::direct, 1, 27, false, 0, 0, 320},
     {"docking-contact", "docking/docking.toml", "nav", Method::direct, 1, 57, false, 0, 0, 320},
     {"cornell", "cornell/cornell.toml", "published", Method::path, 8, -1, true, 0, 0, 128},
-    // Nothing was tuned on it.
+    // Held-out scene: nothing was tuned on it.
     {"craft-and-ball", "craft/craft-and-ball.toml", "chase", Method::path, 5, -1, false, 0, 0, 128},
 }};
 
 constexpr int kReferenceSpp = 4096, kFarReferenceSpp = 16384;
-/// Frames whose times give a median; quick: to see that everything runs.
+/// Numbers of frames whose median time is reported; kQuick: smoke test.
 constexpr int kLadderFrames = 9, kRatioFrames = 15, kLoads = 7, kQuick = 2;
 static_assert(std::min({kLadderFrames, kRatioFrames, kLoads}) >= 7);
 
 /// The scene with the camera and method that are measured.
-Result<std::unique_ptr<World>> world_of(const Standing& s, int size, std::size_t& camera) {
+Result<std::unique_ptr<World>> world_of(const BenchmarkScene& s, int size, std::size_t& camera) {
     auto scene = scene_or_shipped("", s.file, s.method);
     if (!scene) return scene.error();
     const std::string folder = scene->file.substr(0, scene->file.rfind('/'));
@@ -62,10 +62,10 @@ Result<std::unique_ptr<World>> world_of(const Standing& s, int size, std::size_t
     return world;
 }
 
-Result<SceneLadder> measure(const Standing& s, const LadderOptions& o, TracingThreads& threads) {
+Result<SceneLadder> measure(const BenchmarkScene& s, const LadderOptions& o, TracingThreads& threads) {
     SceneLadder l;
     l.scene = s.name;
-    l.speed_up_least = s.speed_up_least;
+    l.speed_up_min = s.speed_up_min;
     l.speed_up_from = s.speed_up_from;
     l.reference_spp = o.quick ? 256 : s.far ? kFarReferenceSpp : kReferenceSpp;
     std::size_t camera = 0;
@@ -169,7 +169,7 @@ void print_ladder(const SceneLadder& l) {
                     "RMSE", "bias, %", "predicted", "to loop", "where the time goes"));
     for (const Rung& r : l.ladder.rungs) {
         const auto s = r.loop ? std::nullopt : speed_up(l.ladder, r);
-        // Frames without random numbers differ by nothing but what their sum rounds to.
+        // Frames without random numbers differ only by the rounding of their sums.
         const double error = r.rmse.standard_error < 1e-9 * r.rmse.value ? 0 : r.rmse.standard_error;
         const std::string predicted = r.loop        ? ""
                                       : r.predicted ? fmt::format("x {:.2f}", r.predicted_to_measured())
@@ -278,9 +278,9 @@ nlohmann::json to_json(const Estimate& e) {
     return {{"value", e.value}, {"standard_error", e.standard_error}};
 }
 
-std::vector<std::string> standing_scenes() {
+std::vector<std::string> benchmark_scenes() {
     std::vector<std::string> names{"all"};
-    for (const Standing& s : kStanding) names.emplace_back(s.name);
+    for (const BenchmarkScene& s : kBenchmarkScenes) names.emplace_back(s.name);
     return names;
 }
 
@@ -300,7 +300,7 @@ Outcome bench_ladder(const LadderOptions& o) {
         print_ratios(*ratios);
     }
     std::vector<SceneLadder> ladders;
-    for (const Standing& s : kStanding) {
+    for (const BenchmarkScene& s : kBenchmarkScenes) {
         if (!wanted(s.name)) continue;
         auto measured = measure(s, o, threads);
         if (!measured) return measured.error();

@@ -1,5 +1,6 @@
-/// apps/bench_ladder.h - `narpa bench render --scenes`: time and error at several budgets on the standing scenes,
-/// and the ratios that frames are judged by; --ablation: what each mechanism earns.
+/// apps/bench_ladder.h - `narpa bench render --scenes`: time and error on the benchmark scenes at several sample
+/// budgets, and the ratios that the gates check; --ablation: the same with each rendering technique switched off in
+/// turn.
 #pragma once
 
 #include <string>
@@ -18,7 +19,7 @@ struct LadderOptions {
 };
 
 /// The names that --scenes takes.
-[[nodiscard]] std::vector<std::string> standing_scenes();
+[[nodiscard]] std::vector<std::string> benchmark_scenes();
 
 Outcome bench_ladder(const LadderOptions& options);
 

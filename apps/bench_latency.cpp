@@ -1,5 +1,4 @@
-// narpa bench latency - commands over each bus, frames through each sink, LiDAR packets: how long they are on the
-// way.
+// narpa bench latency - latency of commands over each bus, of frames through each sink, and of LiDAR packets.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -19,7 +18,7 @@ struct LatencyBenchOptions {
     LatencySettings settings;
 };
 
-/// The processor, by the name that it has itself.
+/// Model name of the processor.
 std::string machine_name() {
     std::ifstream file("/proc/cpuinfo");
     for (std::string line; std::getline(file, line);)
@@ -41,7 +40,7 @@ Status read_format(const LatencyBenchOptions& o, VideoFormat& format) {
     return Ok{};
 }
 
-/// A folder of our own, gone with the object.
+/// Temporary folder, removed by the destructor.
 struct WorkFolder {
     std::string path;
     WorkFolder() : path((std::filesystem::temp_directory_path() / "narpa-latency-XXXXXX").string()) {
@@ -95,7 +94,7 @@ Outcome bench_latency(LatencyBenchOptions o) {
     if (!rows) return rows.error();
     const std::string machine = machine_name();
     say(fmt::format("{}; from the call that hands it over to the call that has it whole", machine));
-    say(in_words(*rows));
+    say(to_text(*rows));
     if (stop_flag()) say("interrupted before the end");
     nlohmann::json of_rows = nlohmann::json::array();
     for (const LatencyRow& row : *rows) of_rows.push_back(to_json(row));

@@ -1,4 +1,4 @@
-// narpa bench lidar - what a LiDAR's sub-rays cost on one core, and the range error they leave.
+// narpa bench lidar - time on one core and range error of a LiDAR against its number of sub-rays.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 namespace narpa::cli {
 namespace {
 
-constexpr double kDivergence_rad = 3e-3;  // of a scene's LiDAR that names none: a VLP-16's
-constexpr double kShippedTime_s = 50;     // of the shipped scene: the station is 1.2 m off
+constexpr double kDivergence_rad = 3e-3;  // where the scene states none: that of a VLP-16
+constexpr double kShippedTime_s = 50;     // of the shipped scene: the station is then 1.2 m away
 
 struct LidarBenchOptions {
     std::string scene, lidar;
@@ -28,9 +28,9 @@ struct LidarBenchOptions {
 Status check_sub_rays(std::vector<int>& sub_rays) {
     using Model = LidarReceiverModel;
     for (const int n : sub_rays)
-        if (n != 1 && (n < Model::kLeastSubRays || n > Model::kMostSubRays))
-            return Error{fmt::format("--sub-rays {}, expected 1, or {} to {}", n, Model::kLeastSubRays,
-                                     Model::kMostSubRays)};
+        if (n != 1 && (n < Model::kMinSubRays || n > Model::kMaxSubRays))
+            return Error{
+                fmt::format("--sub-rays {}, expected 1, or {} to {}", n, Model::kMinSubRays, Model::kMaxSubRays)};
     std::sort(sub_rays.begin(), sub_rays.end());
     sub_rays.erase(std::unique(sub_rays.begin(), sub_rays.end()), sub_rays.end());
     return Ok{};

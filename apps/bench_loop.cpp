@@ -82,7 +82,7 @@ Outcome bench_loop(LoopBenchOptions o) {
     const std::string title =
         fmt::format("{}, {:g} s; load on processors {}", scene->name, o.run.duration_s, fmt::join(o.load, ", "));
     say(title);
-    say(in_words(*runs));
+    say(to_text(*runs));
     for (const std::string& fault : faults) say("failed: " + fault);
     if (!o.plot.empty()) {
         if (auto written = plot_loop(o.plot, title, *runs); !written) return written.error();

@@ -97,7 +97,7 @@ Outcome bench_render(RenderBenchOptions o) {
     if (!index) return index.error();
     Camera& camera = scene->cameras[*index];
     if (auto good = choose_size(o.size, camera); !good) return good.error();
-    camera.format = PixelFormat::grey;  // radiance is what is looked at
+    camera.format = PixelFormat::grey;  // only the radiance is compared
     camera.embedded_line = false;
 
     auto world = World::create(*scene);
@@ -178,7 +178,7 @@ Command add_bench_render(Parser bench_command) {
                  "Measure time and error at a ladder of budgets, on the benchmark scenes: all, craft, "
                  "craft-paths, docking, docking-contact, cornell, craft-and-ball")
             .comma_separated()
-            .one_of(standing_scenes())
+            .one_of(benchmark_scenes())
             .type_name("LIST");
     const Option ablation =
         c.flag("--ablation", o->ladder.ablation,

@@ -1,4 +1,4 @@
-/// apps/bench_scene.h - scenes that come with narpa, at other sizes.
+/// apps/bench_scene.h - scenes shipped with narpa, at other image sizes.
 #pragma once
 
 #include <optional>
@@ -9,16 +9,16 @@
 
 namespace narpa::cli {
 
-/// Where the scenes lie that narpa brings along: beside the folder of the program, in a build and when installed.
+/// Path of a shipped scene: the scenes lie beside the folder of the program, in a build tree and when installed.
 [[nodiscard]] Result<std::string> shipped_scene(const std::string& name);
 
-/// The scene of this file; of an empty name the one that narpa brings along.
+/// Reads `file`, or the shipped scene where `file` is empty.
 [[nodiscard]] Result<Scene> scene_or_shipped(const std::string& file, const std::string& shipped,
                                              std::optional<RenderSettings::Method> method = {});
 
-/// The same view with other pixels.
+/// Changes the resolution and keeps the view.
 void resize(Camera& camera, int width, int height);
-/// The same view, its longer side so many pixels.
+/// The same, with `pixels` on the longer side.
 void resize_longer_side(Camera& camera, int pixels);
 
 }  // namespace narpa::cli

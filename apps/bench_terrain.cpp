@@ -1,4 +1,4 @@
-// narpa bench terrain - what a ray into terrain costs beside one into a mesh of the visible triangles alone.
+// narpa bench terrain - time of a ray into terrain, compared with one into a mesh of only the visible triangles.
 #include <fmt/format.h>
 
 #include "apps/cli.h"

@@ -1,4 +1,4 @@
-/// apps/calibration.h - what a navigation needs to know of the sensors, as files that other software reads.
+/// apps/calibration.h - calibration of the sensors for navigation software, in formats that other software reads.
 #pragma once
 
 #include <string>

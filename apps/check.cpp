@@ -68,7 +68,7 @@ Finding video_devices() {
     return {"V4L2 devices", true, found, ""};
 }
 
-/// `prefix`: of the option that takes them.
+/// `prefix`: of the option's value for such a device, such as "usb:".
 Finding usb_devices(const std::string& name, std::string_view prefix,
                     const Result<std::vector<PluggedUsbDevice>>& devices) {
     if (!devices) return {name, false, devices.error().what, devices.error().remedy};
@@ -84,7 +84,7 @@ Finding usb_devices(const std::string& name, std::string_view prefix,
     return f;
 }
 
-/// A limit of this process, which root does not have; `item` is its name and value in limits.conf.
+/// A resource limit of this process; root is not limited. `item`: its name and value in limits.conf.
 Finding permission(std::string name, int resource, rlim_t needed, std::string_view what, std::string_view without,
                    std::string_view item) {
     rlimit limit{};
@@ -232,16 +232,17 @@ Status save_dbc(const Scene& scene, const std::string& path) {
     return write_file(path, write_dbc(bodies, static_cast<int>(scene.cameras.size())));
 }
 
-/// How many of a sensor's rays meet the body that carries it first.
-struct OwnHull {
+/// Share of a sensor's rays that hit the body that carries it first.
+struct SelfOcclusion {
     double share = 0, nearest_m = kInfinity;
 };
 /// `rays` in the sensor's frame.
-OwnHull own_hull(const World& world, int mount, const Rigid3& T_mount_sensor, const std::vector<Ray>& rays) {
+SelfOcclusion self_occlusion(const World& world, int mount, const Rigid3& T_mount_sensor,
+                             const std::vector<Ray>& rays) {
     BodyPoses at(world.scene().bodies.size());
     world.place(0, mount, at);
     const Rigid3 T_world_sensor = world.sensor_pose(mount, T_mount_sensor, at);
-    OwnHull own;
+    SelfOcclusion own;
     int hits = 0;
     for (const Ray& ray : rays) {
         const Hit hit = world.tracer().intersect(
@@ -254,7 +255,7 @@ OwnHull own_hull(const World& world, int mount, const Rigid3& T_mount_sensor, co
     return own;
 }
 
-/// All over its frame.
+/// A grid over the image.
 std::vector<Ray> rays_of(const Camera& c) {
     constexpr int kAcross = 64, kDown = 48;
     const CameraModelHandle model(c);
@@ -284,7 +285,7 @@ std::vector<Ray> rays_of(const Lidar& l) {
 void check_own_hull(const World& world, const std::string& sensor, const char* rays_do, double much, int mount,
                     const Rigid3& T_mount_sensor, const std::vector<Ray>& rays, nlohmann::json& document) {
     if (mount < 0) return;
-    const OwnHull own = own_hull(world, mount, T_mount_sensor, rays);
+    const SelfOcclusion own = self_occlusion(world, mount, T_mount_sensor, rays);
     document["own_hull_share"] = own.share;
     std::string what = fmt::format("{}: {:.{}f} % of its {} body {}, which carries it", sensor, 100 * own.share,
                                    own.share > 0 && own.share < 0.01 ? 2 : 0, rays_do,
@@ -309,8 +310,8 @@ void check_own_hulls(const World& world, nlohmann::json& document) {
                        s.lidars[i].T_mount_lidar, rays_of(s.lidars[i]), document["lidars"][i]);
 }
 
-/// Of a frame at time 0, where the scene itself places its bodies. Eight rays a pixel suffice for a mean level; a
-/// large image gets fewer, so that the frame takes a second or less.
+/// Signal levels of a frame at time 0, with the bodies where the scene places them. Eight rays a pixel suffice for
+/// a mean level; a large image gets fewer, so that the frame takes a second or less.
 SignalLevels first_levels(const World& world, const Camera& camera) {
     constexpr std::uint64_t kRays = 2'000'000;
     const Scene& s = world.scene();
@@ -332,7 +333,7 @@ SignalLevels first_levels(const World& world, const Camera& camera) {
     return signal_levels(camera, radiance);
 }
 
-/// How the light fits each camera's scale.
+/// Checks the exposure of each camera.
 void check_exposures(const World& world, nlohmann::json& document) {
     const Scene& s = world.scene();
     for (std::size_t i = 0; i < s.cameras.size(); ++i) {
@@ -355,7 +356,7 @@ void check_exposures(const World& world, nlohmann::json& document) {
     }
 }
 
-/// Whether it is written like a CAN bus: with a prefix, or the name of an interface.
+/// True for texts of a CAN bus: a known prefix, or the name of a network interface.
 bool is_bus(const std::string& spec) {
     std::error_code none;
     for (const char* prefix : {"slcan:", "udp:", "usb:", "log:", "can", "vcan"})
@@ -363,7 +364,7 @@ bool is_bus(const std::string& spec) {
     return spec.find('/') == std::string::npos && std::filesystem::exists("/sys/class/net/" + spec, none);
 }
 
-/// The error names the device, or leaves that to the finding.
+/// The finding for a device that cannot be opened, without the device's name in the error text.
 Finding absent(const std::string& spec, const Error& e) {
     const std::string name = spec == "usb:" || spec == "bulk:" ? spec.substr(0, spec.size() - 1) : spec;  // any
     return {name, false, e.what.starts_with(spec + ": ") ? e.what.substr(spec.size() + 2) : e.what, e.remedy};
@@ -388,7 +389,7 @@ Result<Finding> try_device(const std::string& spec) {
     return absent(spec, bus.error());
 }
 
-/// The scenario in words; returns its part of the document.
+/// Prints the scenario; returns its part of the document.
 nlohmann::json describe(const rehearsal::Scenario& s) {
     const auto names = [](const auto& list) {
         std::vector<std::string> out;

@@ -15,8 +15,8 @@
 
 namespace narpa::cli {
 
-/// The result of a subcommand, for --json, or an Error. A gate's document has `passed`; false is exit status 1. A
-/// document that ends with an error all the same has the `error` of to_json.
+/// The result of a subcommand, for --json, or an Error. The document of a check that can fail has `passed`; false
+/// gives exit status 1. A document with results of a command that failed later also has `error` (to_json).
 using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 
@@ -32,7 +32,7 @@ Command add_replay(Parser app);
 Command add_compare(Parser app);
 Command add_estimate(Parser app);
 Command add_rehearse(Parser app);
-/// Of `narpa bench`.
+/// Subcommands of `narpa bench`.
 Command add_bench_render(Parser bench);
 Command add_bench_loop(Parser bench);
 Command add_bench_lidar(Parser bench);
@@ -48,7 +48,7 @@ nlohmann::json to_json(const Error& e);
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
 /// Makes the folder of a file that is to be written; nothing where `file` is empty.
 Status make_folder_of(const std::string& file);
-/// The same of a picture that narpa-plot draws; an Error where its extension is none that it knows.
+/// The same for a picture of narpa-plot; an Error where its file extension is not supported.
 Status make_folder_of_picture(const std::string& file);
 /// "NAME=VALUE" -> {NAME, VALUE}; an Error that names what was expected.
 Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected);

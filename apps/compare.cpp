@@ -26,25 +26,25 @@ struct CompareOptions {
     PoseOptions pose;
     double time_s = 0;
     int spp = 64, threads = 0;
-    std::optional<double> least_overlap, least_correlation, most_shift_px;
+    std::optional<double> min_overlap, min_correlation, max_shift_px;
 };
 
-/// The limits that the comparison misses, a sentence each.
+/// The limits that the comparison does not meet, a sentence each.
 std::vector<std::string> faults_of(const FrameComparison& c, const CompareOptions& o) {
     std::vector<std::string> faults;
-    if (o.least_overlap && c.overlap() < *o.least_overlap)
-        faults.push_back(fmt::format("overlap {:.4f}, expected at least {:g}", c.overlap(), *o.least_overlap));
-    if (o.least_correlation && c.correlation.value_or(-1) < *o.least_correlation)
+    if (o.min_overlap && c.overlap() < *o.min_overlap)
+        faults.push_back(fmt::format("overlap {:.4f}, expected at least {:g}", c.overlap(), *o.min_overlap));
+    if (o.min_correlation && c.correlation.value_or(-1) < *o.min_correlation)
         faults.push_back(fmt::format("correlation {}, expected at least {:g}",
                                      c.correlation ? fmt::format("{:.4f}", *c.correlation) : "not known",
-                                     *o.least_correlation));
-    if (!o.most_shift_px) return faults;
+                                     *o.min_correlation));
+    if (!o.max_shift_px) return faults;
     const double shift_px = c.shift ? std::hypot(c.shift->x_px, c.shift->y_px) : 0;
-    if (!c.shift || c.shift->is_at_limit || shift_px > *o.most_shift_px)
+    if (!c.shift || c.shift->is_at_limit || shift_px > *o.max_shift_px)
         faults.push_back(fmt::format(
             "shift {}, expected at most {:g} px",
             c.shift ? fmt::format("{:.2f} px{}", shift_px, c.shift->is_at_limit ? " or more" : "") : "not known",
-            *o.most_shift_px));
+            *o.max_shift_px));
     return faults;
 }
 
@@ -100,7 +100,7 @@ nlohmann::json picture(const std::string& title, const MeasuredImage& frame, con
         signal.push_back(static_cast<double>(frame.dn[p]) - c.black_dn);
         expected.push_back(std::min(c.gain * static_cast<double>(render.signal[p]), sensor.top_dn - c.black_dn));
     }
-    // Glints may be white: one in a hundred of the lit pixels.
+    // White point: 1 % of the lit pixels (glints) may saturate.
     std::vector<double> sorted = expected;
     const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(c.lit_render / 100);
     std::nth_element(sorted.begin(), bright, sorted.end(), std::greater<>());
@@ -121,7 +121,7 @@ nlohmann::json picture(const std::string& title, const MeasuredImage& frame, con
              })}};
 }
 
-/// The picture, and its document beside it, replace no input.
+/// An Error where the picture, or the document beside it, would overwrite an input.
 Status check_output(const CompareOptions& o, const Scene& scene) {
     if (o.out.empty()) return Ok{};
     if (auto kept = keep_inputs({o.out, document_beside(o.out)}, scene, {o.frame, o.pose.trajectory}); !kept)
@@ -129,7 +129,7 @@ Status check_output(const CompareOptions& o, const Scene& scene) {
     return make_folder_of_picture(o.out);
 }
 
-/// As `narpa render` makes it, but with samples of its own: an emulated frame may have the scene's.
+/// Renders as `narpa render` does. The caller has changed the seed, because an emulated frame may have the scene's.
 ExpectedFrame expected_frame(const CompareOptions& o, const World& world, std::size_t camera, std::int64_t t_ns) {
     CameraUnit unit(world, camera);
     Aovs shown;
@@ -211,13 +211,11 @@ Command add_compare(Parser app) {
         .type_name("FILE.png");
     c.group("Results");
     for (const Option& option :
-         {c.option("--min-overlap", o->least_overlap, "Least part of the pixels lit in either that is lit in both")
+         {c.option("--min-overlap", o->min_overlap, "Least part of the pixels lit in either that is lit in both")
               .range(0.0, 1.0),
-          c.option("--min-correlation", o->least_correlation, "Least correlation of their brightness")
+          c.option("--min-correlation", o->min_correlation, "Least correlation of their brightness")
               .range(-1.0, 1.0),
-          c.option("--max-shift", o->most_shift_px, "Largest shift of the target")
-              .type_name("PX")
-              .range(0.0, 32.0)})
+          c.option("--max-shift", o->max_shift_px, "Largest shift of the target").type_name("PX").range(0.0, 32.0)})
         (void)option.group("Limits: exit status 1 where one is missed");
     c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png",
                 "narpa compare docking --frame out/frame.png --min-overlap 0.95 --max-shift 0.5"});

@@ -34,8 +34,8 @@ struct EstimateOptions {
     std::string scene, csv, picture;
     int every = 1;
 
-    // Of a single file. The truth, or with `no_truth` the guess, is where scene, trajectory and --pose have the
-    // bodies; a guess of a truth lies off it.
+    // Of a single file. Scene, trajectory and --pose give the truth, or with `no_truth` the initial guess. Without
+    // `no_truth`, the guess is the truth displaced.
     std::string frame, sweep;  ///< an image or FILE.raw; FILE.pcap
     double time_s = 0;
     double range_noise_m = 0;  ///< of the sweep, standard deviation; 0: the scene's
@@ -88,7 +88,7 @@ Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_opt
     const std::string_view method = kCameraMethods[static_cast<std::size_t>(tracker_options.method)];
     const EstimateSummary summary = summarise(*tracked);
     say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target, method,
-                    in_words(summary)));
+                    to_text(summary)));
     if (!o.csv.empty())
         if (auto written = write_rows(o.csv, *tracked); !written) return written.error();
     if (!o.picture.empty()) {
@@ -118,15 +118,14 @@ Result<std::unique_ptr<World>> world_of(const EstimateOptions& o, std::int64_t t
     return world;
 }
 
-/// Whose pose an estimate is, and what it is compared with.
+/// Target and sensor of an estimate, and the pose that it is compared with.
 struct Estimated {
     std::string target, sensor, sensor_kind;  ///< the last: "camera" or "lidar"
     Rigid3 T_world_sensor{}, known{};         ///< `known`: T_sensor_target, the truth or the guess
     bool known_is_guess = false;
 };
 
-/// Prints an estimate beside the truth, or the guess; returns the document, which has passed where the pose is
-/// usable.
+/// Prints an estimate beside the truth or the guess. Returns the document; `passed` if the pose is usable.
 nlohmann::json show(const Estimated& of, const Rigid3& T, const Matrix6& covariance, const Matrix6& bound,
                     const Answer& answer) {
     const Vector6 error = error_between(T, of.known);
@@ -194,9 +193,9 @@ Result<LidarSweep> sweep_in(const std::string& path, const Lidar& lidar) {
 void remove_own_body(LidarSweep& sweep, const World& world, const Lidar& lidar, const BodyPoses& at) {
     const Rigid3 T_world_lidar = world.sensor_pose(lidar.mount, lidar.T_mount_lidar, at);
     constexpr double kAlike_m = 0.1;
-    const auto first_hit = [&](const auto& beam, double most_m) {
+    const auto first_hit = [&](const auto& beam, double max_m) {
         return world.tracer().intersect(at, {T_world_lidar * beam.origin_m, T_world_lidar.q * beam.direction},
-                                        most_m);
+                                        max_m);
     };
     std::erase_if(sweep.points, [&](const RangePoint& p) {
         const Hit hit = first_hit(p, p.range_m + kAlike_m);
@@ -208,7 +207,7 @@ void remove_own_body(LidarSweep& sweep, const World& world, const Lidar& lidar, 
     });
 }
 
-/// With the exposure that the scene states.
+/// Ledger of a frame with the exposure of the scene.
 FrameLedger nominal_ledger(const Camera& camera, std::int64_t t_ns) {
     FrameLedger taken;
     taken.t_exposure_mid_ns = t_ns;
@@ -251,7 +250,8 @@ Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
             take();
             if (!options.guess || !tracked.measured || options.search || options.method == CameraMethod::dense)
                 return;
-            // Features take the light that falls on the target in the attitude of the guess: now in that found.
+            // Features are rendered with the illumination at the guessed attitude: repeat with that at the
+            // estimated one.
             at.set(*target, T_world_camera * *tracked.measured);
             take();
         });
@@ -294,7 +294,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     const Rigid3 T_world_lidar = (*world)->sensor_pose(lidar.mount, lidar.T_mount_lidar, then);
     const ApparentMotion motion = motion_between(truth, T_lidar_target_at(t_ns + kLater_ns), kLater_ns * 1e-9);
     std::mt19937_64 random(tracker.seed);
-    const Rigid3 guess = o.no_truth ? truth : off_truth(truth, tracker, random);
+    const Rigid3 guess = o.no_truth ? truth : displaced_truth(truth, tracker, random);
     const double search_m = 0.01 * tracker.start_percent * norm(truth.t) +
                             tracker.start_deg * kDegree * (*world)->tracer().bounding_radius_m(*target);
     IcpSettings settings;

@@ -7,10 +7,10 @@
 namespace narpa::cli {
 namespace {
 
-/// Of full scale, for the brightest parts of an image.
+/// Target level of the brightest parts of an image, as a fraction of full scale.
 constexpr double kAim = 0.7;
 
-/// Which key to set to what, so that the bright parts come to kAim.
+/// Text that names the key and its value for bright parts at kAim.
 std::string change(const Camera& camera, const SignalLevels& levels) {
     const double factor = kAim / levels.bright;
     if (!camera.detector)

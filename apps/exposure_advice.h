@@ -1,4 +1,4 @@
-/// apps/exposure_advice.h - whether a frame's light fits the camera's scale, and what to change where it does not.
+/// apps/exposure_advice.h - detects over- and underexposed frames and suggests other camera settings.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,7 +10,7 @@
 namespace narpa::cli {
 
 /// "12 % of the pixels are saturated (...), expected exposure_s of about 5e-05 ..."; "the image is black: ...".
-/// Empty: the exposure is good, or there is no light at all (which no exposure mends).
+/// Empty: the exposure is good, or there is no light at all (no exposure helps).
 [[nodiscard]] std::string exposure_advice(const Camera& camera, const SignalLevels& levels);
 
 /// "0.062 %", "12 %".

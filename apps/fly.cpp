@@ -27,7 +27,7 @@ struct FlyOptions {
 };
 
 constexpr std::int64_t kMs = 1'000'000;
-/// Of ten heartbeats a second; after so long without one the emulator may be gone.
+/// Heartbeats come ten times a second; after this long without one the emulator may be gone.
 constexpr std::int64_t kDoubtfulSilence_ns = 1000 * kMs;
 
 /// One body's commands on the wire.
@@ -133,8 +133,8 @@ private:
         return Ok{};
     }
 
-    /// Whether it is the run that the trajectory began with, in the mode of this side. An emulator in lockstep
-    /// starts with heartbeats in the state `starting`; one in real time does not.
+    /// Checks that the emulator's run is still the one at the start, and in the mode of this side. An emulator in
+    /// lockstep starts with heartbeats in the state `starting`; one in real time does not.
     Status check_run() const {
         if (!clock_.synchronized()) return Ok{};
         if (clock_.restarted())
@@ -158,7 +158,7 @@ private:
         return Ok{};
     }
 
-    /// In real time: reads heartbeats, and expects one in kHeartbeatSilence_s.
+    /// In real time: reads heartbeats; an Error without one for kHeartbeatSilence_s.
     Status listen() {
         clock_.listen(bus_);
         if (auto fits = check_run(); !fits) return fits;
@@ -166,7 +166,7 @@ private:
         return failed(fmt::format("no heartbeat of the emulator for {:g} s", kHeartbeatSilence_s));
     }
 
-    /// At the end: whether the emulator was there for all that was sent.
+    /// At the end: checks that the emulator is still there and that no frame was dropped.
     Status arrived() {
         if (stop_flag() || bus_.ended()) return Ok{};
         while (!options_.lockstep && !emulator_stops() && clock_.silence_ns() > kDoubtfulSilence_ns) {
@@ -197,7 +197,7 @@ private:
         return Ok{};
     }
 
-    /// Until the emulator's clock has reached the newest time that all bodies have commands for.
+    /// Waits until the emulator's clock has reached the newest time for which all bodies have commands.
     Status wait_in_lockstep() {
         std::int64_t granted = std::numeric_limits<std::int64_t>::max();
         for (const auto& [name, c] : bodies_) granted = std::min(granted, c.newest_ns);
@@ -230,7 +230,7 @@ private:
     std::int64_t start_ns_ = 0, last_granted_ = std::numeric_limits<std::int64_t>::min();
 };
 
-/// A log is the one bus that is a file.
+/// Refuses a log that would overwrite the trajectory. Logs are the only buses that are files.
 Status check_log(const FlyOptions& o) {
     constexpr std::string_view kLog = "log:";
     if (!o.bus.starts_with(kLog)) return Ok{};

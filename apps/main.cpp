@@ -69,7 +69,7 @@ nlohmann::json to_json(const Error& e) {
 
 namespace {
 
-/// False: standard output did not take it.
+/// False: standard output cannot be written.
 bool print_json(const nlohmann::json& document) {
     fmt::print("{}\n", document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     if (std::fflush(stdout) == 0) return true;
@@ -142,7 +142,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
     try {
         return narpa::cli::run(argc, argv);
-    } catch (const std::exception& e) {  // out of memory and the like: nothing of ours throws
+    } catch (const std::exception& e) {  // such as out of memory: narpa's own code does not throw
         narpa::cli::print_error("narpa: {}\n", e.what());
         return 1;
     }

@@ -69,7 +69,7 @@ Result<MapQuantity> read_quantity(const MapOptions& o, const Scene& scene) {
     return q;
 }
 
-/// What a camera of a scene sees at a moment.
+/// The map of what a camera sees at one time.
 struct View {
     std::unique_ptr<World> world;
     std::string camera;
@@ -80,7 +80,7 @@ struct View {
     std::size_t pixels = 0;  ///< with a surface
 };
 
-/// A picture has its document beside it.
+/// All output files: a picture also gets a document beside it.
 std::vector<std::string> outputs_of(const MapOptions& o) {
     if (o.out.ends_with(".pfm") || o.out.ends_with(".json")) return {o.out};
     return {o.out, document_beside(o.out)};

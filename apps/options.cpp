@@ -31,7 +31,7 @@ struct OneValue<std::optional<T>> : OneValue<T> {};
 template <class T>
 struct OneValue<std::vector<T>> : OneValue<T> {};
 
-/// What --help shows for a value of an option without type_name: a whole number, another number, text.
+/// Placeholder in --help of a value without type_name: a whole number, another number, text.
 template <class T>
 constexpr const char* kKindOfValue = std::is_integral_v<T>         ? "N"
                                      : std::is_floating_point_v<T> ? "X"
@@ -289,7 +289,7 @@ const CLI::App& chosen(const CLI::App& app) {
     return commands.empty() ? app : chosen(*commands.front());
 }
 
-/// What other renderers and tools call options of narpa's.
+/// Names of narpa's options in other renderers and tools.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kOtherOptions{
     {{"--samples", "--spp"},
      {"--bounces", "--max-depth"},
@@ -305,8 +305,8 @@ std::string option_meant(const std::string& option, const std::vector<std::strin
     return did_you_mean(option, known);
 }
 
-/// "narpa run: --can has an empty value ...": that of an unset variable of a shell, which would count as an option
-/// that was left out. Empty: there is none.
+/// "narpa run: --can has an empty value ...": usually from an unset shell variable; it would count as an omitted
+/// option. Empty: there is none.
 std::string empty_value(const CLI::App& app, std::span<char* const> words) {
     const CLI::App& command = chosen(app);
     std::string option;  // whose value comes next
@@ -346,8 +346,8 @@ std::string line_error(const CLI::App& app, const CLI::ParseError& e, std::span<
     return name + ": " + e.what() + help;
 }
 
-/// The number of a standard stream that was closed would go to the next file that is opened, and messages with it.
-/// Nothing can be written to the stream afterwards either.
+/// Opens /dev/null for each standard stream that is closed. Otherwise the next file that is opened would get its
+/// descriptor, and messages would go into that file. Read-only, so that writing still fails.
 void occupy_closed_streams() {
     for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         if (::fcntl(fd, F_GETFD) < 0) ::open("/dev/null", O_RDONLY);

@@ -1,5 +1,5 @@
-/// apps/options.h - options of a program or subcommand. CLI11 reads them, and is included by options.cpp alone: it
-/// costs 7 s of compiling for each file.
+/// apps/options.h - options of a program or subcommand. Only options.cpp includes CLI11, which adds 7 s of compile
+/// time to a file.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ public:
     /// Refuses NaN and infinity.
     Option finite() const;
     Option one_of(const std::vector<std::string>& values) const;
-    /// `complaint` returns what is wrong with a value; empty: nothing.
+    /// `complaint` returns the error text for a bad value; empty: the value is good.
     Option check(const std::function<std::string(const std::string&)>& complaint) const;
     Option needs(Option other) const;
     Option excludes(Option other) const;
@@ -39,11 +39,11 @@ public:
     Option repeatable() const;
     /// One value, of comma-separated parts.
     Option comma_separated() const;
-    /// So many values.
+    /// Takes `least` to `most` values.
     Option values(int least, int most) const;
-    /// What --help shows for its value; else N, X or TEXT, by its type.
+    /// Placeholder of the value in --help; default: N, X or TEXT, by its type.
     Option type_name(const std::string& name) const;
-    /// Its heading in --help.
+    /// Heading of the option in --help.
     Option group(const std::string& name) const;
 
     [[nodiscard]] bool given() const;

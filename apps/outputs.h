@@ -1,4 +1,4 @@
-/// apps/outputs.h - outputs of a command that would replace its inputs.
+/// apps/outputs.h - refuses outputs of a command that would overwrite its inputs.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace narpa::cli {
 
 /// An Error that names the first output that is one of the inputs, by whatever path.
 [[nodiscard]] Status keep_inputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
-/// The same of the files that a scene was read from, and `others`, where empty names are none.
+/// The same for the files that a scene was read from, and for `others`; empty names are ignored.
 [[nodiscard]] Status keep_inputs(const std::vector<std::string>& outputs, const Scene& scene,
                                  std::vector<std::string> others);
 

@@ -1,4 +1,4 @@
-/// apps/print_error.h - text on standard error, whether or not somebody reads it.
+/// apps/print_error.h - text on standard error; write errors are ignored.
 #pragma once
 
 #include <fmt/format.h>
@@ -9,7 +9,7 @@
 
 namespace narpa::cli {
 
-/// What standard error does not take is lost: fmt::print would throw, and end a run with its logs.
+/// fmt::print would throw on a write error, which would end a run without its logs.
 template <class... Values>
 void print_error(fmt::format_string<Values...> format, Values&&... values) {
     const std::string text = fmt::format(format, std::forward<Values>(values)...);

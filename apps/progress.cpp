@@ -40,7 +40,7 @@ std::string progress_line(const std::string& what, const Step& step, double seco
     if (step.share < 0) return line + duration(seconds) + " so far";
     const double share = std::min(step.share, 1.0);
     line += fmt::format("{:.0f} %", 100 * share);
-    // Of the first hundredth and the first second too little is known.
+    // No estimate before 1 % and one second: it would be too uncertain.
     if (step.left_s >= 0)
         line += fmt::format(", about {} to go", duration(step.left_s));
     else if (share >= 0.01 && seconds >= 1)

@@ -1,5 +1,4 @@
-/// apps/progress.h - what a command that takes longer does, how far it is and how long it will take, on standard
-/// error.
+/// apps/progress.h - progress of a long command on standard error: what it does, the share done, the time left.
 #pragma once
 
 #include <functional>
@@ -9,21 +8,21 @@
 
 namespace narpa::cli {
 
-/// How far a command is.
+/// Progress of a command.
 struct Step {
     double share = -1;   ///< of the whole, 0 to 1; negative: unknown
     std::string text{};  ///< "frame 3 of 10"; may be empty
-    double left_s = -1;  ///< wall time to the end; negative: as the share and the time so far have it
+    double left_s = -1;  ///< wall time to the end; negative: extrapolated from the share and the elapsed time
 };
 
-/// "rendering: frame 3 of 10, 30 %, about 35 s left", or with the time so far where no share is known.
+/// "rendering: frame 3 of 10, 30 %, about 35 s to go", or with the elapsed time where the share is unknown.
 [[nodiscard]] std::string progress_line(const std::string& what, const Step& step, double seconds);
 
 /// On a terminal one line that is rewritten, and removed at the end; elsewhere a line after two seconds and then
 /// every ten. A thread of its own prints, so that the lines come however long a step takes.
 class Progress {
 public:
-    /// `what`: "rendering camera nav". `poll`: asked for the step from that thread; empty: `show` sets it.
+    /// `what`: "rendering camera nav". `poll`: called by that thread to get the step; empty: `show` sets it.
     explicit Progress(std::string what, std::function<Step()> poll = {});
     ~Progress();
     Progress(const Progress&) = delete;
@@ -43,7 +42,7 @@ private:
     std::jthread thread_;
 };
 
-/// Prints a line on standard error, in place of a line of progress.
+/// Prints a line on standard error; on a terminal it replaces the line of progress.
 void say(std::string_view text);
 
 }  // namespace narpa::cli

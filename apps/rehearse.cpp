@@ -1,4 +1,4 @@
-// narpa rehearse - a docking with everything in the loop, judged.
+// narpa rehearse - runs a scenario in closed loop and checks the result against its limits.
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -18,7 +18,7 @@ struct RehearseOptions {
     int jobs = 1;
 };
 
-/// Whether a line has come on standard input.
+/// True if a line has arrived on standard input.
 Result<bool> line_on_stdin() {
     pollfd input{STDIN_FILENO, POLLIN, 0};
     if (::poll(&input, 1, 0) <= 0) return false;

@@ -19,7 +19,7 @@ constexpr int kFramesCompared = 10;  ///< by default
 
 struct ReplayOptions {
     std::string folder, camera, scene, picture;
-    std::string dynamics, navigation;  ///< commands in place of ours, for a rehearsal in lockstep
+    std::string dynamics, navigation;  ///< commands that replace ours in a lockstep rehearsal
     int reference = 0, frames = 0, threads = 0;
 };
 
@@ -32,7 +32,7 @@ struct Replayed {
     std::optional<RadianceImage> worst_picture, worst_reference;
 };
 
-/// Evenly spread over the run, first and last among them.
+/// Indices spread evenly over the run, including its first and last frame.
 std::vector<std::size_t> chosen_frames(std::size_t frames, std::size_t wanted) {
     const std::size_t n = std::min(frames, wanted);
     std::vector<std::size_t> chosen;
@@ -102,7 +102,7 @@ struct LoggedSensors {
     bool lidars = false;
 };
 
-/// By the names of the log's files: NAME.ledger.csv, NAME.sweeps.csv.
+/// Sensors by the names of the log's files: NAME.ledger.csv, NAME.sweeps.csv.
 LoggedSensors sensors_in(const std::string& folder) {
     constexpr std::string_view kLedger = ".ledger.csv";
     LoggedSensors found;
@@ -146,7 +146,7 @@ Outcome replay_camera(const ReplayOptions& o) {
                             {"frames", frames}};
     if (o.reference == 0 || done.frames.empty()) return document;
     const BudgetCost cost = budget_cost(done.frames);
-    say(in_words(done.frames, cost));
+    say(to_text(done.frames, cost));
     document["reference_spp"] = o.reference;
     document["full_scale_w_m2_sr"] = done.frames.front().compared->difference.full_scale;
     document["cost"] = to_json(cost);
@@ -161,7 +161,7 @@ Outcome replay_camera(const ReplayOptions& o) {
     return document;
 }
 
-/// Of several cameras: `cameras` has the document of each.
+/// Replays several cameras; `cameras` of the document has an entry for each.
 Outcome replay_cameras(ReplayOptions o, const std::vector<std::string>& cameras) {
     bool passed = true;
     nlohmann::json documents = nlohmann::json::array();
@@ -195,7 +195,8 @@ Outcome replay(const ReplayOptions& o) {
     return outcome;
 }
 
-/// In lockstep all of it can be run again; what was run in real time has the emulator's frames to repeat.
+/// A rehearsal in lockstep is run again as a whole; of a run in real time only the emulator's frames can be
+/// repeated.
 Outcome replay_any(const ReplayOptions& o) {
     const bool commands = !o.dynamics.empty() || !o.navigation.empty();
     const auto only_frames = [&](std::string_view why) {

@@ -37,7 +37,7 @@ Status split_outputs(const std::vector<std::string>& texts, std::string_view exp
     return Ok{};
 }
 
-/// Of outputs that are files.
+/// Makes the folders of outputs that are files.
 Status make_folders(const std::vector<std::pair<std::string, std::string>>& outputs) {
     for (const auto& [sensor, sink] : outputs) {
         if (!sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
@@ -46,7 +46,7 @@ Status make_folders(const std::vector<std::pair<std::string, std::string>>& outp
     return Ok{};
 }
 
-/// Lines for whoever waits on --ready-fd.
+/// Lines for the program that waits on --ready-fd.
 std::string addresses(const std::string& bus, CanNode* can) {
     if (!can) return {};
     const CanAddress a = can->bus().address();
@@ -112,7 +112,7 @@ Outcome run(const RunCommandOptions& options) {
         const Progress progress("running", [&] { return step_of(**emulator); });
         return (*emulator)->run(stop_flag());
     }();
-    say(in_words(**emulator));
+    say(to_text(**emulator));
     if (!status) return status.error();
     return report(**emulator);
 }

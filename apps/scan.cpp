@@ -74,7 +74,6 @@ Status write_text(const std::string& path, const std::string& extension, const F
     return Ok{};
 }
 
-/// The packets themselves.
 Status write_capture(const std::string& path, const LidarUnit& of, std::int64_t epoch_unix_ns,
                      const FireAll& fire_all) {
     auto sink = open_packet_sink(path, of.spec().network, epoch_unix_ns, true, of.lidar().model->metadata());

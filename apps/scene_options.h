@@ -28,17 +28,17 @@ struct PoseOptions {
     std::vector<std::string> poses;
 
     void add_to(Parser app);
-    /// --pose: before the world is made. --trajectory: after.
+    /// Apply --pose to the scene, before the world is made, and --trajectory to the world.
     [[nodiscard]] Status place(Scene& scene) const;
     [[nodiscard]] Status load(World& world, std::int64_t t_from_ns, std::int64_t t_to_ns) const;
 };
 
-/// NAME=VALUE of kModelErrors, separated by commas; with `distortion` also that name. `option` is its name, for
-/// messages.
+/// Parses NAME=VALUE pairs, separated by commas. Names: those of kModelErrors, and `distortion` where that pointer
+/// is not null. `option`: name of the option, for messages.
 Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::string& option,
                                            double* distortion = nullptr);
 
-/// How poses are estimated: options of `estimate` and of `run --estimate`.
+/// Settings of pose estimation: options of `estimate` and of `run --estimate`.
 struct TrackerFlags {
     std::string method = "features";
     std::string start = "2,2";
@@ -46,7 +46,7 @@ struct TrackerFlags {
     std::string dashes = "--";  ///< before the options' names
     TrackerOptions tracker;
 
-    /// With `prefix` before each name: --target, or --estimate-target.
+    /// Adds the options, with `prefix` before each name: --target, or --estimate-target.
     void add_to(Parser app, const std::string& prefix);
     [[nodiscard]] Result<TrackerOptions> options() const;
 };

@@ -40,7 +40,8 @@ std::string about(const fs::path& file) {
     return {};
 }
 
-/// "docking" of docking/docking.toml and of the scenario rehearsal/docking.toml; else folder and file.
+/// Short name of a file: "docking" of docking/docking.toml and of the scenario rehearsal/docking.toml; else folder
+/// and file.
 std::string short_name(const fs::path& relative, FileKind kind) {
     const std::string folder = relative.parent_path().string(), stem = relative.stem().string();
     return folder == stem || (kind == FileKind::scenario && folder == "rehearsal") ? stem : folder + "/" + stem;

@@ -20,7 +20,7 @@ struct ShippedFile {
 /// All of one kind that lie beside the program, in a build and when installed, by name.
 [[nodiscard]] std::vector<ShippedFile> shipped_files(FileKind kind);
 
-/// Whether a TOML file is a scene or a scenario, by its tables; empty where it is neither.
+/// The kind of a TOML file, scene or scenario, by its tables; empty where it is neither.
 [[nodiscard]] std::optional<FileKind> kind_of(const std::string& file);
 /// The path of a file, or of the shipped file with this name. Errors: no such file or name; a file of the other
 /// kind.

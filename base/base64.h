@@ -1,4 +1,4 @@
-/// base/base64.h - bytes as text (RFC 4648, section 4), for pages and JSON.
+/// base/base64.h - Base64 encoding (RFC 4648, section 4), for web pages and JSON.
 #pragma once
 
 #include <cstddef>

@@ -24,15 +24,15 @@ namespace narpa {
     }
 }
 
-/// Without the spaces and tabs around it.
+/// Removes leading and trailing spaces and tabs.
 [[nodiscard]] inline std::string_view trimmed(std::string_view text) {
     text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
     return text.substr(0, text.find_last_not_of(" \t") + 1);
 }
 
 /// Calls `take(line, number)`, which returns a Status, with each line after the header; lines that are empty or
-/// begin with '#' are skipped. `what`: "a trajectory", for messages; `item`: "row". Errors: the file cannot be
-/// opened, has another header or no line after it; or what `take` returns.
+/// begin with '#' are skipped. `what` and `item` are words for error messages, e.g. "a trajectory" and "row".
+/// Errors: the file cannot be opened, has another header or no line after it; or an error of `take`.
 template <class Take>
 Status read_csv_lines(const std::string& file, std::string_view header, const std::string& what,
                       const std::string& item, const Take& take) {

@@ -1,5 +1,5 @@
-/// base/fast_math.h - sine, cosine and powers without branches or tables, so that the compiler works
-/// on several lanes at a time. The same numbers in a lane as alone.
+/// base/fast_math.h - sine, cosine and powers without branches or tables, so that the compiler can vectorise them.
+/// A value is the same in a vector lane as in scalar code.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +13,10 @@ namespace narpa {
 struct SinCos {
     double sin, cos;
 };
-/// Of an angle of so many turns, |turns| < 2^49: absolute error below 4e-16. Taylor's series about the nearest
+/// Sine and cosine of 2 pi * turns, |turns| < 2^49: absolute error below 4e-16. Taylor series about the nearest
 /// quarter turn, where |angle| <= pi / 4.
 [[nodiscard]] inline SinCos sincos_of_turns(double turns) noexcept {
-    constexpr double kToInteger = 0x1.8p52;  // added, it leaves the nearest integer in the lowest bits
+    constexpr double kToInteger = 0x1.8p52;  // adding it puts the nearest integer into the lowest bits
     const double shifted = 4 * turns + kToInteger;
     const auto quarter = std::bit_cast<std::uint64_t>(shifted);
     const double x = 2 * std::numbers::pi * (turns - 0.25 * (shifted - kToInteger)), y = x * x;
@@ -44,7 +44,7 @@ struct SinCos {
     // x = m 2^e, sqrt(1/2) <= m < sqrt(2); ln m by the series of the inverse hyperbolic tangent.
     constexpr std::uint64_t kRootHalf = 0x3fe6a09e667f3bcd;
     const std::uint64_t bits = std::bit_cast<std::uint64_t>(x), above = bits - kRootHalf;
-    // The exponent, its sign carried along in the bits of a double: no conversion from 64-bit integers.
+    // The exponent as a double, by its bits instead of a conversion from 64-bit integers, which AVX2 does not have.
     const std::uint64_t e_bits = (above + (std::uint64_t{1024} << 52)) >> 52;
     const double e = std::bit_cast<double>(0x4330000000000000 | e_bits) - (0x1p52 + 1024);
     const double m = std::bit_cast<double>(bits - ((e_bits - 1024) << 52));

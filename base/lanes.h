@@ -1,5 +1,5 @@
-/// base/lanes.h - sixteen rays or pixels side by side, laid out so that the compiler works on several of them with
-/// each instruction.
+/// base/lanes.h - batches of sixteen rays or pixels as structures of arrays, so that the compiler vectorises loops
+/// over them.
 #pragma once
 
 #include <array>
@@ -20,12 +20,12 @@ using Lanes = std::array<T, kLanes>;
 inline bool is_set(std::uint32_t bits, std::size_t i) noexcept {
     return (bits >> i & 1u) != 0;
 }
-/// The first n lanes.
+/// Mask of the first n lanes.
 inline std::uint32_t lanes_below(std::size_t n) noexcept {
     return (1u << n) - 1;
 }
 
-/// For each of the bits -1 where it is set, else 0: loops choose by these without a branch.
+/// Expands a bit mask to one int per lane: -1 where the bit is set, else 0, for branch-free selection in loops.
 [[nodiscard]] inline Lanes<int> masks_of(std::uint32_t bits) noexcept {
     Lanes<int> masks;
     for (std::size_t i = 0; i < kLanes; ++i) masks[i] = -static_cast<int>(bits >> i & 1u);
@@ -77,7 +77,7 @@ struct alignas(64) PoseLanes {
     void fill(const Rigid3& T) { w.fill(T.q.w), x.fill(T.q.x), y.fill(T.q.y), z.fill(T.q.z), t.fill(T.t); }
 };
 
-/// `then` where the condition holds, without a branch.
+/// `then` if the condition holds, else `otherwise`; branch-free.
 [[nodiscard]] inline double choose(bool condition, double then, double otherwise) noexcept {
     return condition ? then : otherwise;
 }

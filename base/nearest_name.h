@@ -1,4 +1,4 @@
-/// base/nearest_name.h - the name that a misspelt one was meant to be.
+/// base/nearest_name.h - suggests the known name nearest to a misspelt one.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace narpa {
 
-/// Levenshtein's distance.
+/// Levenshtein distance.
 [[nodiscard]] inline std::size_t edit_distance(std::string_view a, std::string_view b) {
     std::vector<std::size_t> row(b.size() + 1);
     std::iota(row.begin(), row.end(), std::size_t{0});
@@ -27,15 +27,16 @@ namespace narpa {
     return row.back();
 }
 
-/// The nearest of `known`, at most two changes away; else one that only lacks its end or has too much of it, as
-/// "fov_horizontal" without "_deg". A plural in "ies" counts as its singular. Empty: none is near.
+/// The nearest of `known`, at an edit distance of at most 2; else one of which `name` is a prefix, as
+/// "fov_horizontal" of "fov_horizontal_deg", or that is a prefix of `name`. A plural in "ies" matches its singular.
+/// Empty: none is near.
 [[nodiscard]] inline std::optional<std::string> nearest_name(std::string_view name,
                                                              const std::vector<std::string>& known) {
     constexpr std::size_t kFarthest = 2;
     if (name.ends_with("ies"))
         for (const std::string& k : known)
             if (k == std::string(name.substr(0, name.size() - 3)) + "y") return k;
-    constexpr std::size_t kBeginning = 4;  ///< fewer letters in common are chance
+    constexpr std::size_t kBeginning = 4;  ///< fewer letters in common match by chance
     std::optional<std::string> nearest;
     if (name.size() >= kBeginning)
         for (const std::string& k : known)

@@ -69,7 +69,7 @@ inline constexpr std::array<std::string_view, 12> kPixelFormatNames{
     return band == 'R' ? 0 : band == 'G' ? 1 : 2;
 }
 
-/// What is wrong with a frame of this size, or nothing: YUYV holds pixels in pairs, a mosaic in 2 x 2.
+/// Why a frame of this size is not possible, or an empty text: YUYV holds pixels in pairs, a mosaic in 2 x 2.
 [[nodiscard]] inline std::string unfit_size(PixelFormat f, int width, int height) {
     const auto text = [&](const char* what, int is) {
         return std::string(name(f)) + " needs an even " + what + ", not " + std::to_string(is);

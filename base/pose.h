@@ -127,7 +127,7 @@ struct Motion {
     Vec3 rate_rad_s{};
 };
 
-/// Straight on, with constant velocity and body rate.
+/// Extrapolates with constant velocity and body rate.
 inline Motion extrapolate(const Motion& from, double dt_s) {
     if (dt_s == 0) return from;  // bit for bit
     Motion m = from;

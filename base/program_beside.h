@@ -1,4 +1,4 @@
-/// base/program_beside.h - programs of ours that another one starts.
+/// base/program_beside.h - finds the narpa programs that another narpa program starts.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,8 @@ namespace narpa {
     return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
 }
 
-/// A program beside the running one; where there is none, its bare name, which posix_spawnp searches on PATH.
+/// Path of a program in the folder of the running one; if there is none, its bare name, which posix_spawnp searches
+/// on PATH.
 [[nodiscard]] inline std::string program_beside(const std::string& name) {
     std::error_code none;
     const std::filesystem::path beside = program_folder() / name;

@@ -1,4 +1,4 @@
-/// base/read_number.h - numbers as texts.
+/// base/read_number.h - parses numbers.
 #pragma once
 
 #include <charconv>
@@ -6,7 +6,7 @@
 
 namespace narpa {
 
-/// The whole text is the number; `base`: of integers.
+/// True if the whole text is a number. `base`: the radix of an integer.
 template <class... Base>
 [[nodiscard]] bool read_number(std::string_view text, auto& value, Base... base) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base...);

@@ -15,14 +15,14 @@ namespace narpa {
 
 inline constexpr std::string_view kReadyLine = "READY=1\n";
 
-/// `fd` < 0: not given. Also keeps the descriptor from programs that this one starts.
+/// `fd` < 0: not given. Also sets close-on-exec, so that child processes do not inherit the descriptor.
 inline Status check_ready_fd(int fd) {
     if (fd >= 0 && ::fcntl(fd, F_SETFD, FD_CLOEXEC) != 0)
         return Error{"--ready-fd " + std::to_string(fd) + ": expected an open descriptor"};
     return Ok{};
 }
 
-/// `addresses`: lines KEY=VALUE. It is no error if the reader has gone.
+/// `addresses`: lines KEY=VALUE. It is no error if the reader has closed its end.
 inline void notify_ready(int fd, std::string addresses = {}) {
     if (fd < 0) return;
     addresses += kReadyLine;

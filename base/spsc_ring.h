@@ -1,4 +1,5 @@
-/// base/spsc_ring.h - a ring buffer of fixed size from one thread to another; neither side waits or allocates.
+/// base/spsc_ring.h - a lock-free ring buffer of fixed size with one producer and one consumer; neither side waits
+/// or allocates.
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@ namespace narpa {
 template <class T, std::size_t N>
 class SpscRing {
 public:
-    /// False: full, and the value is lost (the caller counts).
+    /// False: the ring is full and the value is dropped; the caller counts drops.
     bool push(const T& value) noexcept {
         const std::size_t head = head_.load(std::memory_order_relaxed);
         if (head - tail_.load(std::memory_order_acquire) == N) return false;

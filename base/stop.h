@@ -39,7 +39,7 @@ inline void stop_on_signals() noexcept {
     if (::sigaction(SIGHUP, nullptr, &hang_up) == 0 && hang_up.sa_handler != SIG_IGN)
         ::sigaction(SIGHUP, &action, nullptr);
     struct sigaction ignore {};
-    ignore.sa_handler = SIG_IGN;  // a reader that closes a FIFO or a socket is an error code
+    ignore.sa_handler = SIG_IGN;  // writing to a closed FIFO or socket returns an error code instead
     ::sigaction(SIGPIPE, &ignore, nullptr);
 }
 

@@ -22,7 +22,7 @@ inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
 [[nodiscard]] constexpr double to_seconds(std::int64_t ns) noexcept {
     return static_cast<double>(ns) * 1e-9;
 }
-/// Since a value of monotonic_ns().
+/// Time since `start_ns`, a value of monotonic_ns().
 [[nodiscard]] inline double seconds_since(std::int64_t start_ns) noexcept {
     return to_seconds(monotonic_ns() - start_ns);
 }

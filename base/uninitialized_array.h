@@ -1,4 +1,5 @@
-/// base/uninitialized_array.h - an array whose elements are written before they are read.
+/// base/uninitialized_array.h - a fixed-size array without initialisation: elements must be written before they are
+/// read.
 #pragma once
 
 #include <cstddef>

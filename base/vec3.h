@@ -42,7 +42,7 @@ template <class T>
 Vec<T> normalized(const Vec<T>& a) {
     return a / norm(a);
 }
-/// Of three bands: what a monochrome sensor would weigh.
+/// Mean of the three bands, as a monochrome sensor weighs them.
 template <class T>
 constexpr T mean_band(const Vec<T>& a) {
     return (a.x + a.y + a.z) / 3;

@@ -1,4 +1,4 @@
-/// base/write_file.h - a whole file at once, and the name of one beside another.
+/// base/write_file.h - writes a whole file; names the JSON document beside a file.
 #pragma once
 
 #include <cerrno>
@@ -12,7 +12,8 @@
 
 namespace narpa {
 
-/// Of a file that could not be opened for writing, with the system's reason: call it before errno changes.
+/// The error of a file that could not be opened for writing, with the system's reason: call it before errno
+/// changes.
 [[nodiscard]] inline Error cannot_open_to_write(const std::string& path) {
     return {std::string("cannot be written: ") + std::strerror(errno), path, 0, 0, ErrorKind::missing};
 }
@@ -22,7 +23,7 @@ namespace narpa {
     return std::filesystem::path(file).replace_extension(".json").string();
 }
 
-/// Errors: cannot be opened (`missing`), cannot be written to the end (`failed`).
+/// Errors: the file cannot be opened (`missing`), or not be written completely (`failed`).
 [[nodiscard]] inline Status write_file(const std::string& path, std::string_view text) {
     std::ofstream out(path, std::ios::binary);
     if (!out) return cannot_open_to_write(path);

@@ -57,11 +57,11 @@ std::vector<Rgb> seen(const ScatteredLight& light, const std::vector<AirView>& v
     return out;
 }
 
-/// A camera that is exposed for the brightest view sees none of what is fainter than this part of it. The night
-/// side of the limb goes down to 1e-8.
+/// Views fainter than this part of the brightest are left out: a camera exposed for that one would not show them.
+/// The night side of the limb goes down to 1e-8.
 constexpr double kFaintest = 1e-3;
 
-/// Views, one after the other for each elevation of the Sun.
+/// The views are grouped by elevation of the Sun.
 void set_error(AirErrorRow& row, const std::vector<Rgb>& found, const std::vector<Rgb>& exact) {
     const std::size_t of_sun = exact.size() / kSunElevations_deg.size();
     double squares = 0;
@@ -112,7 +112,7 @@ std::vector<AirErrorRow> shell_rows() {
     return rows;
 }
 
-/// Of a view 4 x 4 tiles, each of 8 x 8 pixels, a tenth of a degree wide, about a direction.
+/// A view is 4 x 4 tiles of 8 x 8 pixels, each a tenth of a degree wide, about a direction.
 constexpr std::size_t kTilePixels = 64, kTilesAcross = 4, kViewPixels = kTilePixels * kTilesAcross * kTilesAcross;
 std::array<RayBundle::Ray, kTilePixels> tile_of(const Vec3& direction, std::size_t column, std::size_t row) {
     const Vec3 across = normalized(cross(direction, Vec3{0, 0, 1})), upright = cross(across, direction);
@@ -128,7 +128,7 @@ std::array<RayBundle::Ray, kTilePixels> tile_of(const Vec3& direction, std::size
 std::vector<Rgb> seen_in_tiles(const ScatteredLight& light, const std::vector<AirView>& views, float tolerance) {
     std::vector<Rgb> out;
     std::array<AirLight, kTilePixels> found;
-    AirCells cells;
+    AirCache cells;
     for (const AirView& v : views)
         for (std::size_t tile = 0; tile < kTilesAcross * kTilesAcross; ++tile) {
             RayBundle(light, v.from, &v.to_sun, cells, tolerance)

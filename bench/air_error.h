@@ -9,7 +9,7 @@
 
 namespace narpa {
 
-/// With one setting, all others being the finest.
+/// The result for one value of a setting, with all others at their finest.
 struct AirErrorRow {
     int setting = 0;  ///< shells, steps, heights of the table, wavelengths of a band, 1e4 times the tolerance
     double rms = 0, most = 0;  ///< relative errors over views; refraction: arcsec at 85 and at 89 degrees
@@ -25,7 +25,7 @@ struct AirErrors {
 
 /// Views of the Earth's sky at turbidity 3: from the ground, from an aeroplane and from orbit, with the Sun from 60
 /// degrees above the horizon to 6 below. Views fainter than a thousandth of the brightest with the same Sun are
-/// left out. `progress` is told each step.
+/// left out. `progress` is called with each step.
 [[nodiscard]] AirErrors measure_air_errors(const std::function<void(const std::string&)>& progress);
 
 /// A physical sky, Hosek and Wilkie's and the path-traced one at one place: radiance of the green band for an

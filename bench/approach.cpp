@@ -32,7 +32,7 @@ BodyPoses at_time_0(const World& world) {
     return at;
 }
 
-/// As the estimators know it.
+/// The camera as the estimators know it: without the ignored properties.
 Camera without(const std::vector<std::string>& ignored, Camera camera) {
     for (const std::string& what : ignored) {
         if (what == "distortion") camera.model = nullptr;
@@ -106,7 +106,7 @@ ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, do
     for (const ApproachFrame& f : frames) {
         if (f.range_m >= from_m || f.range_m < to_m) continue;
         ++b.frames;
-        b.wrong += f.claimed && !(f.nees <= kBeyondNees);
+        b.wrong += f.claimed && !(f.nees <= kSixSigmaNees);
         ms.push_back(f.ms);
         renders.add(f.renders);
         if (!f.found) continue;
@@ -136,7 +136,7 @@ ApproachFrames::ApproachFrames(const World& world, const Camera& camera, std::si
       bytes_(frame_bytes({camera.width, camera.height, camera.format, camera.period_ns})),
       made_{{}, {}, at_, {}, {}} {}
 
-/// Near the line of approach, looking nearly at the target's origin.
+/// A camera near the line of approach, aimed nearly at the target's origin.
 Rigid3 ApproachFrames::pose(double range_m, std::uint32_t number) const {
     std::mt19937_64 random(options_.seed * 1'000'003 + number);
     std::normal_distribution<double> normal;

@@ -30,8 +30,8 @@ struct ApproachOptions {
     int basin_trials = 10;
     double basin_range_m = 20;
     std::uint64_t seed = 1;
-    /// Of cameras with a shutter, in a direction of its own for each frame: the camera turns, and passes the
-    /// target.
+    /// For cameras with a shutter: rate at which the camera turns and speed at which it passes the target, in a
+    /// random direction for each frame.
     double turn_rad_s = 0, speed_m_s = 0;
     std::vector<std::string>
         ignored;  ///< kIgnorable: what the estimators do not know of the camera; rows: the rolling of its shutter
@@ -43,7 +43,7 @@ struct ApproachFrame {
     double range_m = 0;
     bool found = false;                       ///< claimed, and both errors are below a fifth of the start's
     bool claimed = false;                     ///< by the method
-    std::string why;                          ///< not, or not in all motions
+    std::string why;                          ///< why the pose is not claimed, or not in all motions
     double rotation_rad = 0, position_m = 0;  ///< errors
     double bound_rotation_rad = 0, bound_position_m = 0;  ///< roots of the summed variances of the bound
     double nees = 0;
@@ -55,7 +55,7 @@ struct ApproachFrame {
 struct ApproachBand {
     double from_m = 0, to_m = 0;
     int frames = 0, found = 0;
-    int wrong = 0;  ///< claimed, and beyond their covariance: kBeyondNees
+    int wrong = 0;  ///< claimed, and beyond their covariance: kSixSigmaNees
     double rotation_rms_rad = 0, position_rms_m = 0;
     double rotation_of_bound = 0, position_of_bound = 0;  ///< RMS of error over bound
     double nees_median = 0;                               ///< 5.35 for a consistent estimator
@@ -70,7 +70,7 @@ struct BasinCell {
 struct ApproachRun {
     CameraMethod method{};
     std::vector<ApproachFrame> frames;
-    std::vector<ApproachBand> bands;  ///< the last is of them all
+    std::vector<ApproachBand> bands;  ///< the last is over all frames
     std::vector<BasinCell> basin;
 };
 
@@ -114,8 +114,8 @@ private:
                                                     const StopFlag& stop);
 
 [[nodiscard]] nlohmann::json to_json(const std::vector<ApproachRun>& runs);
-/// A table for people.
-[[nodiscard]] std::string in_words(const std::vector<ApproachRun>& runs);
+/// A table as text.
+[[nodiscard]] std::string to_text(const std::vector<ApproachRun>& runs);
 /// Plots (plot/plot.h) five frames of the approach, the renders at the poses that the points lead to, and the
 /// distances of the matches before and after each solution (a figure of the paper).
 [[nodiscard]] Status plot_approach_frames(const std::string& path, const World& world, std::size_t camera,

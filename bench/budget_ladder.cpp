@@ -49,7 +49,7 @@ struct View {
     FrameAccount render(CameraRenderer& renderer, const FrameSettings& settings) {
         return threads.arena.execute([&] { return renderer.render(at, T_world_camera, settings, image); });
     }
-    /// Of the last frame, as errors are taken of it.
+    /// The last frame as compared with the reference: averaged over bands, unless errors are per band.
     std::span<const Rgb> pixels() {
         for (Rgb& p : image.pixels)
             if (!bands) p = Rgb{1, 1, 1} * mean_band(p);
@@ -57,7 +57,7 @@ struct View {
     }
 };
 
-/// Renders frame `number`; returns its account, of the loop the rays alone.
+/// Renders frame `number` and returns its account; for the plain loop it holds the rays alone.
 FrameAccount render(View& v, Candidate& c, const ReferenceLoop& loop, std::uint32_t number) {
     c.settings.frame = number;
     if (c.renderer) return v.render(*c.renderer, c.settings);
@@ -179,8 +179,8 @@ Ladder measure_ladder(const World& world, std::size_t camera, const LadderSettin
 
 namespace {
 
-/// Seconds to an error, along straight lines between these rungs in the logarithms of time and error. None where
-/// their errors do not enclose it; `beyond`: there the outer lines go on.
+/// Seconds to an error, by linear interpolation between these rungs in the logarithms of time and error. None where
+/// their errors do not enclose it; `beyond`: extrapolated there.
 std::optional<double> time_to_error(double error, const std::vector<const Rung*>& rungs,
                                     double (Rung::*seconds)() const, bool beyond) {
     std::vector<std::array<double, 2>> line;
@@ -217,10 +217,10 @@ std::optional<double> cost_at_equal_error(const Ladder& ladder, const Rung& rung
     return s ? std::optional(rung.median_cpu_s() / *s) : std::nullopt;
 }
 
-std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by, double rays_least) {
+std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by, double rays_min) {
     std::vector<double> all;
     for (const Rung& r : ladder.rungs)
-        if (!r.loop && r.adaptive == adaptive && r.estimates_error() && r.rays >= rays_least)
+        if (!r.loop && r.adaptive == adaptive && r.estimates_error() && r.rays >= rays_min)
             if (const auto s = speed_up(ladder, r, by)) all.push_back(*s);
     if (all.empty()) return {};
     const auto [least, most] = std::minmax_element(all.begin(), all.end());

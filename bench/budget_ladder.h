@@ -23,7 +23,7 @@ namespace narpa {
 inline constexpr std::array<const char*, kPhases> kPhaseNames{"aim",         "rays",     "shading",
                                                               "shadow_rays", "indirect", "passes"};
 
-/// Of the reference: their scatter gives its own noise.
+/// Number of images whose mean is the reference; their scatter gives its noise.
 inline constexpr int kReferenceImages = 16;
 
 struct LadderSettings {
@@ -85,20 +85,20 @@ struct Ladder {
 /// Wall time, or CPU time of all threads.
 enum class TimeBy : std::uint8_t { wall, cpu };
 
-/// Time of the plain loop to the error of this rung, over that of the rung: along straight lines between the loop's
-/// rungs in the logarithms of time and error. None where its errors do not enclose the rung's.
+/// Time of the plain loop to the error of this rung, over that of the rung: by linear interpolation between the
+/// loop's rungs in the logarithms of time and error. None where its errors do not enclose the rung's.
 [[nodiscard]] std::optional<double> speed_up(const Ladder& ladder, const Rung& rung, TimeBy by = TimeBy::wall);
-/// CPU time of a rung without some mechanism over that of the full renderer to the same error; the outer lines go
-/// on beyond its rungs. Above 1: the mechanism earns the difference.
+/// CPU time of a rung without some mechanism over that of the full renderer to the same error, extrapolated beyond
+/// its rungs. Above 1: the mechanism saves time.
 [[nodiscard]] std::optional<double> cost_at_equal_error(const Ladder& ladder, const Rung& rung);
 
-/// Over the budgets that have one, without those whose frames left something out.
+/// Speed-ups over the budgets that have one, except those whose frames left something out.
 struct SpeedUps {
     double median = 0, least = 0, most = 0;
     std::size_t budgets = 0;
 };
-/// Of the budgets in rays (adaptive), or of the fixed numbers of samples.
+/// For the budgets in rays (adaptive), or for the fixed numbers of samples.
 [[nodiscard]] std::optional<SpeedUps> speed_ups(const Ladder& ladder, bool adaptive, TimeBy by = TimeBy::wall,
-                                                double rays_least = 0);  ///< of frames with so many rays at least
+                                                double rays_min = 0);  ///< of frames with so many rays at least
 
 }  // namespace narpa

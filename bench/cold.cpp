@@ -11,7 +11,7 @@
 #include <numbers>
 #include <random>
 
-#include "bench/honesty_scenes.h"
+#include "bench/consistency_scenes.h"
 #include "bench/statistics.h"
 #include "emulator/log/estimate_report.h"
 #include "estimator/search/pose_search.h"
@@ -58,7 +58,7 @@ Result<std::unique_ptr<ColdTarget>> cold_target(const std::string& name, const S
         c = scaled(c, factor, factor);
         return std::make_unique<ColdTarget>(std::move(scene), i);
     }
-    auto scene = honesty_scene(name, size);
+    auto scene = consistency_scene(name, size);
     if (!scene) return scene.error();
     return std::make_unique<ColdTarget>(*std::move(scene), 0);
 }
@@ -83,7 +83,7 @@ ColdTrial cold_trial(ColdTarget& target, const ColdOptions& o, ColdDraw& d) {
     Rigid3 truth{d.attitude(), {}};
     truth.t = distance_m * normalized(Vec3{right, down, 1}) - truth.q * tracer.bounds(target.body).centre_m;
     const double range_m = norm(truth.t);
-    // The Sun stands evenly over a cap about the direction from the target to the camera.
+    // The direction to the Sun is uniform over a cap about the direction from the target to the camera.
     const double cosine = d.uniform(std::cos(o.phase_deg * kDegree), 1),
                  around = d.uniform(0, 2 * std::numbers::pi);
     out.phase_deg = std::acos(cosine) / kDegree;
@@ -131,7 +131,7 @@ ColdTrial cold_trial(ColdTarget& target, const ColdOptions& o, ColdDraw& d) {
 }  // namespace
 
 bool ColdTrial::wrong() const {
-    return answer == AnswerKind::good && !(nees <= kBeyondNees);
+    return answer == AnswerKind::good && !(nees <= kSixSigmaNees);
 }
 
 Result<std::vector<ColdTrial>> run_cold(const ColdOptions& o, const Scene& docking, int first,
@@ -175,7 +175,7 @@ nlohmann::json to_json(const std::vector<ColdTrial>& trials) {
     return all;
 }
 
-std::string in_words(const std::vector<ColdTrial>& trials) {
+std::string to_text(const std::vector<ColdTrial>& trials) {
     std::string out = fmt::format("{:<12} {:>7} {:>9} {:>7} {:>7} {:>8} {:>6} {:>6} {:>7} {:>9} {:>9} {:>14}\n",
                                   "cold start", "trials", "acquired", "ambig.", "unobs.", "refused", "wrong",
                                   "NEES", "median", "RMS deg", "% range", "CPU s: median");
@@ -191,7 +191,7 @@ std::string in_words(const std::vector<ColdTrial>& trials) {
             wrong += t->wrong();
             times.push_back(t->cpu_s);
             if (t->answer != AnswerKind::good) continue;
-            nees.add(std::min(t->nees, kBeyondNees)), all_nees.push_back(t->nees);
+            nees.add(std::min(t->nees, kSixSigmaNees)), all_nees.push_back(t->nees);
             turn.add(t->rotation_rad), shift.add(t->position_of_range);
         }
         out += fmt::format(

@@ -1,5 +1,5 @@
-/// bench/cold.h - poses without a guess: random attitudes, ranges and Sun directions, with the truth beside each
-/// answer.
+/// bench/cold.h - pose estimation without an initial guess: random attitudes, ranges and Sun directions, and the
+/// errors of the answers.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,8 @@
 namespace narpa {
 
 struct ColdOptions {
-    std::vector<std::string> targets{"craft", "detailed"};  ///< of honesty_scenes.h, or bodies of the docking scene
+    std::vector<std::string> targets{"craft",
+                                     "detailed"};  ///< of consistency_scenes.h, or bodies of the docking scene
     int trials = 60;
     int size = 96;            ///< pixels of the longer side of the camera
     double range_part = 0.3;  ///< the expected range is off by up to this part of the true one
@@ -36,7 +37,7 @@ struct ColdTrial {
     double cpu_s = 0;                                          ///< of the search, all threads
     int templates = 0, renders = 0;
 
-    /// A good answer that is not the truth within its covariance: kBeyondNees.
+    /// A good answer that is not the truth within its covariance: kSixSigmaNees.
     [[nodiscard]] bool wrong() const;
 };
 
@@ -48,6 +49,6 @@ struct ColdTrial {
                                                       const StopFlag& stop);
 
 [[nodiscard]] nlohmann::json to_json(const std::vector<ColdTrial>& trials);
-[[nodiscard]] std::string in_words(const std::vector<ColdTrial>& trials);
+[[nodiscard]] std::string to_text(const std::vector<ColdTrial>& trials);
 
 }  // namespace narpa

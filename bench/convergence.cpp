@@ -50,7 +50,7 @@ void ImageMean::add(std::span<const Rgb> image) {
     levels_.push_back(sum / static_cast<double>(mean.size()));
 }
 
-/// Of all images.
+/// Share of this half in all images.
 double ImageMean::share(std::size_t half) const noexcept {
     return static_cast<double>((count() + 1 - half) / 2) / static_cast<double>(count());
 }

@@ -1,9 +1,9 @@
 /// bench/convergence.h - how the error of a Monte Carlo image falls with the number of samples: its
 /// statistics.
 ///
-/// ImageSeries of one view, made with independent random numbers, are set beside a reference that was made the same
-/// way with many more samples. Sums are double. Values are radiances, W m^-2 sr^-1, every band of every pixel for
-/// itself.
+/// Series of images of one view, rendered with independent random numbers, are compared with a reference that was
+/// rendered the same way with many more samples. Sums are double. Values are radiances, W m^-2 sr^-1, each band of
+/// each pixel separately.
 #pragma once
 
 #include <array>
@@ -21,8 +21,8 @@ struct Estimate {
     [[nodiscard]] double sigmas() const noexcept;
 };
 
-/// Mean of independent images of the same size, of all and of every other one: the difference of the halves
-/// is noise.
+/// Means of independent images of the same size: of all, and of each half (every other one). The difference of the
+/// halves is noise.
 class ImageMean {
 public:
     explicit ImageMean(std::size_t pixels)
@@ -66,7 +66,7 @@ struct ErrorRow {
     Estimate pixel_bias_squared;
 };
 
-/// Sets images beside a reference (of at least two images), which must outlive it.
+/// Compares images with a reference (of at least two images), which must outlive it.
 class ErrorAgainst {
 public:
     explicit ErrorAgainst(const ImageMean& reference);

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/approach.h"
+#include "bench/consistency.h"
 #include "bench/filter.h"
-#include "bench/honesty.h"
 #include "bench/icp.h"
 #include "bench/pnp.h"
 #include "bench/statistics.h"
@@ -55,7 +55,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FilterTime, t_s, nees, position_rms_m, positi
 
 // Poses from points
 
-std::string in_words(const std::vector<PnpCell>& cells) {
+std::string to_text(const std::vector<PnpCell>& cells) {
     std::string out = fmt::format("{:<24} {:>13} {:>13} {:>9} {:>9} {:>9}\n", "", "rotation", "position", "failed",
                                   "flagged", "time");
     out += fmt::format("{:<24} {:>6} {:>6} {:>6} {:>6} {:>9} {:>9} {:>9}\n", "in units of the bound", "median",
@@ -73,7 +73,7 @@ std::string in_words(const std::vector<PnpCell>& cells) {
     return out;
 }
 
-std::string in_words(const PnpVerdict& v) {
+std::string to_text(const PnpVerdict& v) {
     return fmt::format(
         "points: worst RMS {:.3f} bounds from ten points up; {} cells with more failures than {}; time: cold "
         "{:.2f} "
@@ -100,7 +100,7 @@ json to_json(const std::vector<ApproachRun>& runs) {
     return all;
 }
 
-std::string in_words(const std::vector<ApproachRun>& runs) {
+std::string to_text(const std::vector<ApproachRun>& runs) {
     std::string out =
         fmt::format("{:<10} {:>14} {:>9} {:>6} {:>11} {:>11} {:>15} {:>6} {:>8} {:>8}\n", "approach", "range, m",
                     "found", "wrong", "RMS deg", "RMS m", "/ bound", "NEES", "renders", "ms");
@@ -146,7 +146,7 @@ json to_json(const StereoBench& bench) {
     return out;
 }
 
-std::string in_words(const StereoBench& bench) {
+std::string to_text(const StereoBench& bench) {
     std::string out =
         fmt::format("{:<16} {:>4} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>14}\n", "matching", "axis",
                     "median m", "quartiles", "", "largest m", "RMS m", "outliers", "RMS/range %");
@@ -171,7 +171,7 @@ json to_json(const std::vector<IcpRun>& runs) {
     return json(runs);
 }
 
-std::string in_words(const std::vector<IcpRun>& runs) {
+std::string to_text(const std::vector<IcpRun>& runs) {
     std::string text =
         "start deg      %  starts   found  silent  unseen  rot mdeg    mm  to bound: rot, trans  nees"
         "  points  steps   us p50      p99\n";
@@ -204,7 +204,7 @@ json to_json(const std::vector<FilterRun>& runs) {
     return all;
 }
 
-std::string in_words(const std::vector<FilterRun>& runs) {
+std::string to_text(const std::vector<FilterRun>& runs) {
     std::string text =
         fmt::format("{:<40} {:>5} {:>6} {:>13} {:>7} {:>6} {:>6} {:>20} {:>22} {:>7}\n", "case", "runs", "NEES",
                     "band", "inside", "NIS", "gated", "last mm: rms, sigma", "last mrad: rms, sigma", "us");
@@ -220,11 +220,11 @@ std::string in_words(const std::vector<FilterRun>& runs) {
     return text;
 }
 
-// Honesty
+// Consistency
 
-json to_json(const std::vector<HonestyRow>& rows) {
+json to_json(const std::vector<ConsistencyRow>& rows) {
     json all = json::array();
-    for (const HonestyRow& r : rows) {
+    for (const ConsistencyRow& r : rows) {
         json answers;
         for (std::size_t i = 0; i < kAnswerKinds.size(); ++i) answers[std::string(kAnswerKinds[i])] = r.answers[i];
         all.push_back({{"method", r.method},
@@ -240,25 +240,25 @@ json to_json(const std::vector<HonestyRow>& rows) {
     return all;
 }
 
-std::string in_words(const std::vector<HonestyRow>& rows) {
+std::string to_text(const std::vector<ConsistencyRow>& rows) {
     std::string out =
         fmt::format("{:<30} {:>7} {:>6} {:>6} {:>6} {:>7} {:>7} {:>7} {:>7} {:>9} {:>9}\n", "", "trials", "good",
                     "ambig.", "unobs.", "refused", "beyond", "NEES", "median", "RMS deg", "% range");
-    const auto line = [&](const std::string& name, const HonestyRow& r) {
+    const auto line = [&](const std::string& name, const ConsistencyRow& r) {
         Mean nees, turn, shift;
-        for (const double v : r.nees) nees.add(std::min(v, kBeyondNees));
+        for (const double v : r.nees) nees.add(std::min(v, kSixSigmaNees));
         for (const double v : r.rotation_rad) turn.add(v);
         for (const double v : r.position_of_range) shift.add(v);
         out += fmt::format("{:<30} {:>7} {:>6} {:>6} {:>6} {:>7} {:>7} {:>7.2f} {:>7.2f} {:>9.4f} {:>9.4f}\n", name,
                            r.trials(), r.answers[0], r.answers[1], r.answers[2], r.answers[3], r.beyond,
                            nees.mean(), quantile(r.nees, 0.5), turn.rms() / kDegree, 100 * shift.rms());
     };
-    using Key = std::function<std::string(const HonestyRow&)>;
-    for (const Key& key : {Key([](const HonestyRow& r) { return r.method; }),
-                           Key([](const HonestyRow& r) { return r.method + ", " + r.target; }),
-                           Key([](const HonestyRow& r) { return r.method + ", " + r.condition; })}) {
-        std::map<std::string, HonestyRow> sums;
-        for (const HonestyRow& r : rows) sums[key(r)].add(r);
+    using Key = std::function<std::string(const ConsistencyRow&)>;
+    for (const Key& key : {Key([](const ConsistencyRow& r) { return r.method; }),
+                           Key([](const ConsistencyRow& r) { return r.method + ", " + r.target; }),
+                           Key([](const ConsistencyRow& r) { return r.method + ", " + r.condition; })}) {
+        std::map<std::string, ConsistencyRow> sums;
+        for (const ConsistencyRow& r : rows) sums[key(r)].add(r);
         for (const auto& [name, sum] : sums) line(name, sum);
     }
     return out;

@@ -55,6 +55,6 @@ struct FilterRun {
 
 [[nodiscard]] nlohmann::json to_json(const std::vector<FilterRun>& runs);
 /// A table, a line for each case.
-[[nodiscard]] std::string in_words(const std::vector<FilterRun>& runs);
+[[nodiscard]] std::string to_text(const std::vector<FilterRun>& runs);
 
 }  // namespace narpa

@@ -11,10 +11,10 @@
 namespace narpa {
 namespace {
 
-/// A camera that makes frame after frame of one view: direct light, one sample a pixel.
-class Maker {
+/// Renders frame after frame of one view: direct light, one sample a pixel.
+class FrameRenderer {
 public:
-    Maker(const World& world, std::size_t index, TracingThreads& threads)
+    FrameRenderer(const World& world, std::size_t index, TracingThreads& threads)
         : at(world.scene().bodies.size()),
           camera_(world.scene().cameras[index]),
           threads_(threads),
@@ -25,7 +25,7 @@ public:
         world.place(0, camera_.mount, at);
         T_world_camera = world.camera_pose(camera_, 0, at);
         settings_.seed = world.scene().render.seed;
-        make();  // takes the memory
+        make();  // allocates memory
     }
     struct Times {
         double radiance_s, detector_s, hand_over_s;
@@ -64,7 +64,7 @@ private:
 };
 
 Result<FrameCost> frame_against_raw(const World& world, std::size_t index, int rounds, TracingThreads& threads) {
-    Maker maker(world, index, threads);
+    FrameRenderer maker(world, index, threads);
     auto raw = threads.arena.execute([&] { return raw_embree(world.scene(), maker.at); });
     if (!raw) return raw.error();
     const Vec3 to_sun = world.scene().sun ? normalized(world.scene().sun->direction) : Vec3{0, 0, 1};
@@ -75,7 +75,7 @@ Result<FrameCost> frame_against_raw(const World& world, std::size_t index, int r
     std::vector<double> frame, radiance, detector, hand_over, primary, shadow;
     FrameCost cost;
     for (int k = 0; k < rounds; ++k) {
-        const Maker::Times t = maker.make();
+        const FrameRenderer::Times t = maker.make();
         frame.push_back(t.frame_s()), radiance.push_back(t.radiance_s);
         detector.push_back(t.detector_s), hand_over.push_back(t.hand_over_s);
         cost.raw = trace();
@@ -90,7 +90,7 @@ Result<FrameCost> frame_against_raw(const World& world, std::size_t index, int r
 
 void measure_cover(const World& world, std::size_t far, std::size_t edge, std::size_t filled, int rounds,
                    TracingThreads& threads, CraftRatios& out) {
-    Maker of_far(world, far, threads), of_edge(world, edge, threads), of_filled(world, filled, threads);
+    FrameRenderer of_far(world, far, threads), of_edge(world, edge, threads), of_filled(world, filled, threads);
     std::vector<double> far_s, edge_s, filled_s;
     for (int k = 0; k < rounds; ++k) {
         far_s.push_back(of_far.make().radiance_s);
@@ -101,12 +101,12 @@ void measure_cover(const World& world, std::size_t far, std::size_t edge, std::s
 }
 
 void measure_moved(const World& world, std::size_t camera, int rounds, TracingThreads& threads, CraftRatios& out) {
-    Maker maker(world, camera, threads);
+    FrameRenderer maker(world, camera, threads);
     const BodyPoses still = maker.at;
     std::vector<double> still_s, moved_s;
     for (int k = 0; k < rounds; ++k) {
         maker.at = still;
-        maker.make();  // so that the next finds nothing moved
+        maker.make();  // so that nothing has moved at the next one
         still_s.push_back(maker.make().frame_s());
         const std::int64_t start_ns = monotonic_ns();
         for (std::size_t b = 0; b < still.T_world_body.size(); ++b)
@@ -149,7 +149,7 @@ Result<CraftRatios> measure_ratios(const std::function<Result<Scene>()>& load, i
         if (!again) return again.error();
         auto new_world = World::create(*std::move(again));
         if (!new_world) return new_world.error();
-        const Maker maker(**new_world, cameras[0], threads);
+        const FrameRenderer maker(**new_world, cameras[0], threads);
         load_s.push_back(seconds_since(start_ns));
     }
     r.load_s = median(load_s);
@@ -172,16 +172,16 @@ std::optional<std::string> prediction_fault(const Rung& rung) {
 }
 
 std::optional<std::string> speed_fault(const SceneLadder& scene) {
-    if (scene.speed_up_least <= 0) return {};
+    if (scene.speed_up_min <= 0) return {};
     constexpr double kUsed = 0.9;  // a budget is not used up to the last ray
-    const double rays_least = kUsed * scene.speed_up_from * scene.width * scene.height;
-    const auto s = speed_ups(scene.ladder, true, TimeBy::wall, rays_least);
+    const double rays_min = kUsed * scene.speed_up_from * scene.width * scene.height;
+    const auto s = speed_ups(scene.ladder, true, TimeBy::wall, rays_min);
     if (!s) return "no budget's error lies between those of the plain loop";
-    if (s->median >= scene.speed_up_least) return {};
+    if (s->median >= scene.speed_up_min) return {};
     return fmt::format(
         "{:.2f} times as fast as the plain loop at equal error{}, expected {:g} or more", s->median,
         scene.speed_up_from > 0 ? fmt::format(" from {:g} rays a pixel on", scene.speed_up_from) : "",
-        scene.speed_up_least);
+        scene.speed_up_min);
 }
 
 }  // namespace

@@ -22,21 +22,22 @@ struct FrameCost {
     [[nodiscard]] double to_raw() const { return frame_s / raw.seconds(); }
 };
 
-/// Of the craft at full size, by direct light with one sample a pixel. Medians, seconds.
+/// Frame times of the craft at full size, by direct light with one sample a pixel. Medians, seconds.
 struct CraftRatios {
     FrameCost near, far;  ///< of those cameras, beside Embree's calls on the same rays
-    /// Radiance of frames that the craft covers: 1 % of from afar, with triangles finer than the pixels; 1 % of at
-    /// its edge, and all of, both from near by through one lens. Without the detector, which gives every pixel
-    /// noise.
+    /// Radiance times of frames of which the craft covers 1 %, from afar, with triangles finer than the pixels
+    /// (far); 1 %, at its edge (edge); and all (filled). Edge and filled have the same position and lens. Without
+    /// the detector, which adds noise to every pixel.
     double far_s = 0, edge_s = 0, filled_s = 0;
-    /// With all bodies at rest, and with each of them somewhere else (by 0.1 mm and 0.01 mrad, so that it shows the
-    /// same) in every frame.
+    /// With all bodies at rest, and with each of them moved in every frame (by 0.1 mm and 0.01 mrad, so that the
+    /// image stays the same).
     double still_s = 0, moved_s = 0;
     double load_s = 0;  ///< from the name of the file to the first frame's bytes
 };
 
-/// `load` reads the scene as the bench has it, with cameras near, far, edge and filled. `rounds`: frames that give
-/// a median; `loads`: the same of first frames. Errors: `load`'s; no such camera; bodies that are not triangles.
+/// `load` reads the scene as the bench has it, with cameras near, far, edge and filled. `rounds`: number of frames
+/// of a median; `loads`: number of first frames of a median. Errors: `load`'s; no such camera; bodies that are not
+/// triangles.
 [[nodiscard]] Result<CraftRatios> measure_ratios(const std::function<Result<Scene>()>& load, int rounds, int loads,
                                                  TracingThreads& threads,
                                                  const std::function<void(const std::string&)>& progress);
@@ -45,12 +46,13 @@ struct CraftRatios {
 struct SceneLadder {
     std::string scene;
     int width = 0, height = 0, reference_spp = 0;
-    double speed_up_least = 0;  ///< required over the plain loop; 0: not judged
-    double speed_up_from = 0;   ///< judged over budgets of at least so many rays a pixel
+    double speed_up_min = 0;   ///< required over the plain loop; 0: not judged
+    double speed_up_from = 0;  ///< judged over budgets of at least so many rays a pixel
     Ladder ladder;
 };
-/// Bounds: times of a frame to those of Embree's calls on its rays; of 1 % cover to full cover, triangles as
-/// large; seconds that moved bodies cost; seconds to the first frame; predicted to measured error.
+/// Bounds: time of a frame over that of Embree's calls on its rays; time at 1 % cover over that at full cover, with
+/// equally large triangles; seconds that moved bodies add; seconds to the first frame; predicted over measured
+/// error.
 inline constexpr double kToRawMost = 1.6, kEdgeMost = 0.032, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
 inline constexpr double kPredictedLeast = 0.85, kPredictedMost = 1.40;
 

@@ -11,15 +11,15 @@
 namespace narpa {
 namespace {
 
-/// Found: within so many standard deviations of the bound at the truth. Other minima are hundreds of them away.
+/// Found: within this many standard deviations of the bound at the truth. Other minima are hundreds of them away.
 constexpr double kFoundSigma = 10;
 
-/// The LiDAR is seen from the target so far off its x axis at most.
+/// Largest angle between the target's x axis and the direction to the LiDAR.
 constexpr double kCone_deg = 20;
-/// Of the target during the sweep, on each axis at most.
+/// Largest velocity and rate of the target during the sweep, on each axis.
 constexpr double kVelocity_m_s = 0.1, kRate_rad_s = 0.02;
 constexpr double kRotation_hz = 10, kRangeMax_m = 100;
-constexpr double kRangeNoise_m = 0.02;  ///< before the model rounds them
+constexpr double kRangeNoise_m = 0.02;  ///< before the LiDAR model rounds the ranges
 
 class Sweeps {
 public:

@@ -22,7 +22,7 @@ struct IcpStarts {
 /// The LiDAR's distances from the target's origin.
 inline constexpr double kIcpDistanceMin_m = 10, kIcpDistanceMax_m = 40;
 
-/// RMS over its bound: of the root mean square of error over the bound's standard deviation, three axes together.
+/// `to_bound`: root mean square of the error over the bound's standard deviation, three axes together.
 struct IcpRun : IcpStarts {
     int found = 0;       ///< within ten standard deviations of the bound that holds at the truth
     int told = 0;        ///< of the others, those that the estimator itself calls not credible
@@ -43,6 +43,6 @@ struct IcpRun : IcpStarts {
 
 [[nodiscard]] nlohmann::json to_json(const std::vector<IcpRun>& runs);
 /// A table, a line for each.
-[[nodiscard]] std::string in_words(const std::vector<IcpRun>& runs);
+[[nodiscard]] std::string to_text(const std::vector<IcpRun>& runs);
 
 }  // namespace narpa

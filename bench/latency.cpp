@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWarmUp = 5;  // the first ones: buffers are mapped, streams begin
 
-/// What sender and receiver tell each other.
+/// State that sender and receiver share.
 struct LatencyExchange {
     std::mutex mutex;
     std::condition_variable changed;
@@ -26,7 +26,7 @@ struct LatencyExchange {
     Status joined{Ok{}};
 };
 
-/// Sends number after number, each once the one before has come or is given up.
+/// Sends the messages in order, each once the previous one has arrived or timed out.
 void send_all(const LatencyEnds& ends, const LatencySettings& s, LatencyExchange& x) {
     Status joined = ends.join ? ends.join() : Status{Ok{}};
     std::unique_lock lock(x.mutex);
@@ -94,7 +94,7 @@ nlohmann::json to_json(const LatencyRow& row) {
             {"max_s", at(1.0)}};
 }
 
-std::string in_words(const std::vector<LatencyRow>& rows) {
+std::string to_text(const std::vector<LatencyRow>& rows) {
     std::string text = fmt::format("{:<28} {:<40} {:>6} {:>9} {:>9} {:>9} {:>5}", "what", "by", "count", "p50, ms",
                                    "p99, ms", "max, ms", "lost");
     for (const LatencyRow& r : rows)

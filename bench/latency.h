@@ -1,5 +1,5 @@
-/// bench/latency.h - how long a pose command needs over each bus, a frame through each sink and a LiDAR packet to
-/// its receiver: from the call that hands it over to the call that has it whole, each on a thread of its own.
+/// bench/latency.h - latency of a pose command over each bus, of a frame through each sink and of a LiDAR packet to
+/// its receiver: from the call that sends it to the call that returns it complete, each on a thread of its own.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,9 @@
 namespace narpa {
 
 struct LatencySettings {
-    int count = 200;                           ///< that are measured, after some that are not
-    std::int64_t pause_ns = 5'000'000;         ///< between an arrival and the next
-    std::int64_t patience_ns = 5'000'000'000;  ///< after which one counts as lost
+    int count = 200;                           ///< measured messages, after a warm-up
+    std::int64_t pause_ns = 5'000'000;         ///< between an arrival and the next message
+    std::int64_t patience_ns = 5'000'000'000;  ///< after which a message counts as lost
     VideoFormat format{640, 480, PixelFormat::grey, 100'000'000};
 };
 
@@ -28,16 +28,16 @@ struct LatencyRow {
     int lost = 0;
 };
 
-/// The two ends of one way; the numbers tell what is sent apart. Both wait and allocate as they like.
+/// The two ends of a channel; messages are identified by their numbers. Both may block and allocate.
 struct LatencyEnds {
     /// On the sender's thread, before the first `send`. Absent: nothing to do.
     std::function<Status()> join{};
-    /// False: not taken.
+    /// False: not accepted.
     std::function<bool(std::uint32_t number)> send;
-    /// Waits at most so long; the number of what has come.
+    /// Waits for at most this time; returns the number of the message that has arrived, if any.
     std::function<std::optional<std::uint32_t>(std::int64_t timeout_ns)> receive;
 };
-/// One at a time. Errors: of `join`; nothing came at all.
+/// Sends one message at a time. Errors: of `join`; no message arrived at all.
 [[nodiscard]] Result<LatencyRow> measure_latency(const LatencyEnds& ends, const LatencySettings& settings,
                                                  const StopFlag& stop);
 
@@ -56,6 +56,6 @@ struct LatencyEnds {
 
 [[nodiscard]] nlohmann::json to_json(const LatencyRow& row);
 /// A table, a line for each row.
-[[nodiscard]] std::string in_words(const std::vector<LatencyRow>& rows);
+[[nodiscard]] std::string to_text(const std::vector<LatencyRow>& rows);
 
 }  // namespace narpa

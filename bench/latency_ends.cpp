@@ -1,4 +1,4 @@
-// The ways that bench/latency.h measures: buses, sinks of frames, LiDAR packets.
+// The channels that bench/latency.h measures: buses, sinks of frames, LiDAR packets.
 #include <fmt/format.h>
 #include <sys/stat.h>
 
@@ -23,9 +23,9 @@ namespace narpa {
 namespace {
 
 constexpr std::uint32_t kBody = 0x100;
-constexpr std::int64_t kSeen_ns = 60 * kSecond_ns;  // until a kernel has seen a device that was plugged in
+constexpr std::int64_t kSeen_ns = 60 * kSecond_ns;  // for a kernel to register a device that was plugged in
 
-/// `open` again, until the kernel has seen the device.
+/// Repeats `open` until the kernel has registered the device.
 template <class T>
 Result<T> once_it_is_seen(const std::function<Result<T>()>& open, const StopFlag& stop) {
     const std::int64_t until_ns = monotonic_ns() + kSeen_ns;
@@ -84,8 +84,8 @@ Result<LatencyRow> measure_commands(CanBus& hub, const std::string& name, const 
 /// A sink and how its frames are read here.
 struct VideoEnds {
     std::unique_ptr<VideoSink> sink;
-    std::unique_ptr<VideoSource> source;  ///< none: a file is looked at
-    std::unique_ptr<VhciPort> plug{};     ///< goes first
+    std::unique_ptr<VideoSource> source;  ///< null: a file is polled
+    std::unique_ptr<VhciPort> plug{};     ///< destroyed first
 };
 
 std::uint16_t port_of(const std::string& description) {

@@ -22,7 +22,7 @@ Lidar with_sub_rays(Lidar lidar, int sub_rays, double divergence_rad) {
     return lidar;
 }
 
-/// Nothing left to chance but the sub-rays.
+/// The LiDAR without random effects other than the sub-rays.
 Lidar without_noise(Lidar lidar) {
     LidarReceiverModel& r = lidar.receiver;
     r.detection_snr = r.range_noise_m = r.range_noise_at_limit_m = r.velocity_noise_m_s = 0;
@@ -251,11 +251,11 @@ std::vector<std::string> lidar_cost_faults(const LidarCost& cost) {
     std::vector<std::string> faults;
     if (cost.make != "VLP-16" || cost.rate_hz > 10) return faults;
     for (const LidarCostRow& row : cost.rows)
-        for (const auto [sub_rays, load_most] : kLidarLoadMost)
-            if (row.sub_rays == sub_rays && cost.load(row) > load_most)
+        for (const auto [sub_rays, load_max] : kLidarLoadMost)
+            if (row.sub_rays == sub_rays && cost.load(row) > load_max)
                 faults.push_back(fmt::format("{} sub-ray{}: {:.1f} % of a core, expected at most {:.0f} %",
                                              sub_rays, sub_rays == 1 ? "" : "s", 100 * cost.load(row),
-                                             100 * load_most));
+                                             100 * load_max));
     return faults;
 }
 

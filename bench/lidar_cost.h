@@ -1,11 +1,11 @@
-/// bench/lidar_cost.h - what a LiDAR's sub-rays cost on one core, and what they earn.
+/// bench/lidar_cost.h - time of a LiDAR's sub-rays on one core, and the range error that they leave.
 ///
 /// One turn of the instrument is measured, from exact poses to packets, with every number of sub-rays in the same
-/// run. Times are CPU times of the one thread that fires, medians over turns; all candidates take turns. Beside
-/// each stand two bounds: the tracer's own calls on the same rays, and plain Embree calls on them
-/// (raw_embree_scene.h), with nothing made of the hits.
+/// run. Times are CPU times of the one thread that fires, medians over turns; all candidates take turns. Each is
+/// compared with two lower bounds: the tracer's own calls on the same rays, and plain Embree calls on them
+/// (raw_embree_scene.h), without processing the hits.
 ///
-/// The error of a range is against a beam of many more sub-rays, the receiver's noise left out on either side.
+/// The error of a range is against a beam of many more sub-rays, both without receiver noise.
 #pragma once
 
 #include <array>
@@ -53,7 +53,7 @@ struct LidarCost {
     std::string make;
     double rate_hz = 0, beam_divergence_rad = 0, pulse_length_m = 0;
     std::size_t packets = 0, shots = 0, returns = 0;  ///< of the turn; returns with the first row's sub-rays
-    double covers_s = 0;                              ///< so long the instrument takes for them
+    double covers_s = 0;                              ///< time in which the instrument sends them
     int reference_sub_rays = 0;
     double reference_s = 0;  ///< CPU time of the reference's turn
     std::vector<LidarCostRow> rows;
@@ -63,15 +63,15 @@ struct LidarCost {
     [[nodiscard]] double load(const LidarCostRow& r) const { return r.fire_s / covers_s; }
 };
 
-/// `load`: trajectories and the like, once the scene is a world. `progress` is told each step.
+/// `load`: called with the world, to load trajectories and the like. `progress` is called with each step.
 [[nodiscard]] Result<LidarCost> measure_lidar_cost(Scene scene, const LidarCostSettings& settings,
                                                    const std::function<Status(World&)>& load,
                                                    const std::function<void(const std::string&)>& progress);
 
-/// Most of a core that a VLP-16 at up to 10 Hz may take.
+/// Largest allowed load of one core by a VLP-16 at up to 10 Hz.
 struct LidarLoadBound {
     int sub_rays;
-    double load_most;
+    double load_max;
 };
 inline constexpr std::array<LidarLoadBound, 2> kLidarLoadMost{{{1, 0.05}, {16, 0.25}}};
 /// Bounds that are missed, one sentence each; instruments that have none have no faults.

@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The child's whole life. It has a copy of the parent's memory and touches nothing of it.
+/// The body of the child process, which never returns. It does not touch the memory copied from its parent.
 [[noreturn]] void keep_busy(int cpu, pid_t parent) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(0);
@@ -45,14 +45,14 @@ json to_json(const CameraRun& c) {
     return out;
 }
 
-/// "1.23 / 4.56 / 7.89": median, 99.9 of 100 and the largest, ms.
+/// "1.23 / 4.56 / 7.89": median, 99.9th percentile and maximum, ms.
 template <class H>
 std::string ms(const H& h) {
     return fmt::format("{:.2f} / {:.2f} / {:.2f}", h.percentile_ns(0.5) * 1e-6, h.percentile_ns(0.999) * 1e-6,
                        h.percentile_ns(1) * 1e-6);
 }
 
-/// Where the time went, and what it was good for.
+/// Times of the stages, samples per pixel, refinement steps and expected error.
 std::string frames_in_words(const CameraStats& s) {
     std::string steps;
     for (std::size_t i = 0; i < kStepNames.size(); ++i)
@@ -103,7 +103,7 @@ double CameraRun::allowance_used(double p) const noexcept {
 
 Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunOptions& options,
                          const std::vector<int>& load, const StopFlag& stop) {
-    // Before the run's own memory is there: a copy of it would make its pages fault once more.
+    // Forks before the run allocates its memory: copy-on-write would make its pages fault once more.
     auto competing = CompetingLoad::start(load);
     if (!competing) return competing.error();
     auto emulator = Emulator::create(scene, options);
@@ -148,7 +148,7 @@ json to_json(const LoopRun& run) {
             {"notices", run.notices}};
 }
 
-std::string in_words(const std::vector<LoopRun>& runs) {
+std::string to_text(const std::vector<LoopRun>& runs) {
     std::string out = "times in ms: p50 / p99.9 / max; from the deadline: negative is before\n";
     out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24} {:>26} {:>8}\n", "run", "sensor",
                        "frames", "late", "lost", "part", "woken late", "render", "mid-exposure to out",
@@ -176,28 +176,28 @@ std::string in_words(const std::vector<LoopRun>& runs) {
 
 namespace {
 
-/// Pairs of ms and the fraction of the frames that exceed it, down to the one frame that took longest: each of the
-/// last hundred, before them fewer and fewer. `least_ms`: a logarithmic axis needs a positive number.
+/// Pairs of ms and the fraction of the frames that exceed it, down to the one frame that took longest: one for each
+/// of the longest hundred, thinned out before them. `min_ms`: a logarithmic axis needs a positive number.
 template <class H>
-nlohmann::json exceedance(const H& h, double least_ms) {
+nlohmann::json exceedance(const H& h, double min_ms) {
     nlohmann::json points = nlohmann::json::array();
     const auto n = static_cast<double>(h.count());
     for (double k = n; k >= 1; k = std::min(k - 1, std::floor(k * (k > 100 ? 0.97 : 1))))
-        points.push_back({std::max(least_ms, h.percentile_ns((n - k + 1) / n) * 1e-6), k / n});
+        points.push_back({std::max(min_ms, h.percentile_ns((n - k + 1) / n) * 1e-6), k / n});
     return points;
 }
 
 }  // namespace
 
 Status plot_loop(const std::string& path, const std::string& title, const std::vector<LoopRun>& runs) {
-    constexpr double kLeast_ms = 1e-3;
+    constexpr double kMin_ms = 1e-3;
     nlohmann::json of_runs = nlohmann::json::array();
     for (const LoopRun& run : runs) {
         nlohmann::json cameras = nlohmann::json::array();
         for (const CameraRun& c : run.cameras)
             cameras.push_back({{"name", c.name},
-                               {"wake_late_ms", exceedance(c.stats.wake_late, kLeast_ms)},
-                               {"hand_over_ms", exceedance(c.stats.hand_over, kLeast_ms)},
+                               {"wake_late_ms", exceedance(c.stats.wake_late, kMin_ms)},
+                               {"hand_over_ms", exceedance(c.stats.hand_over, kMin_ms)},
                                {"late_ms", exceedance(c.stats.late, -1e9)}});
         of_runs.push_back({{"name", run.name}, {"cameras", cameras}});
     }

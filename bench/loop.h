@@ -12,7 +12,7 @@
 
 namespace narpa {
 
-/// A process for each of these processors, bound to it, that does nothing but count, at the usual priority; ended
+/// Runs a busy loop in a process for each of these processors, pinned to it, at normal priority. The processes end
 /// with the object, or with the thread that made it.
 class CompetingLoad {
 public:
@@ -38,9 +38,9 @@ struct CameraRun {
 
     /// Frames without a whole image; there must be none.
     [[nodiscard]] std::uint64_t incomplete() const noexcept { return stats.steps.back(); }
-    /// Of the frames that fell due, those handed over late, or never made because the one before was.
+    /// Fraction of the frames due that were handed over late, or skipped because the one before was late.
     [[nodiscard]] double late_fraction() const noexcept;
-    /// The part of its allowance that a fraction p of the frames did not exceed; above 1: late.
+    /// Quantile p of the time of a frame over its allowance; above 1: late.
     [[nodiscard]] double allowance_used(double p) const noexcept;
 };
 
@@ -68,7 +68,7 @@ struct LoopRun {
 
 [[nodiscard]] nlohmann::json to_json(const LoopRun& run);
 /// A table, a line for each camera and LiDAR.
-[[nodiscard]] std::string in_words(const std::vector<LoopRun>& runs);
+[[nodiscard]] std::string to_text(const std::vector<LoopRun>& runs);
 
 /// Plots (plot/plot.h) for each camera how many frames exceed a wake-up latency, a latency, a lateness.
 [[nodiscard]] Status plot_loop(const std::string& path, const std::string& title, const std::vector<LoopRun>& runs);

@@ -50,7 +50,7 @@ Vec3 half_box_m(const PnpSetting& s) {
 
 }  // namespace
 
-const char* in_words(PnpScene scene) {
+const char* to_text(PnpScene scene) {
     switch (scene) {
         case PnpScene::nominal: return "nominal";
         case PnpScene::half_turn: return "half a turn";
@@ -95,7 +95,7 @@ std::optional<PnpTrial> draw_trial(const PnpSetting& s, std::mt19937_64& random)
 
 namespace {
 
-/// Errors beyond so many bounds are failures.
+/// Errors beyond this many bounds are failures.
 constexpr double kFailedAtBounds = 10;
 
 /// Results of one method in a cell.
@@ -157,7 +157,7 @@ PnpCell run_cell(const PnpSetting& setting, const PnpBenchOptions& options, cons
         bound_position.push_back(trial->bound_position_m / setting.range_m);
         ++done;
     }
-    PnpCell cell{in_words(setting.scene),
+    PnpCell cell{to_text(setting.scene),
                  setting.points,
                  setting.noise_px,
                  setting.range_m,

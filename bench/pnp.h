@@ -16,7 +16,7 @@
 namespace narpa {
 
 enum class PnpScene : std::uint8_t { nominal, half_turn, plane, plane_facing, line, tiny, camera_plane };
-[[nodiscard]] const char* in_words(PnpScene scene);
+[[nodiscard]] const char* to_text(PnpScene scene);
 
 struct PnpSetting {
     PnpScene scene = PnpScene::nominal;
@@ -101,8 +101,8 @@ struct PnpVerdict {
 };
 [[nodiscard]] PnpVerdict judge(const std::vector<PnpCell>& cells);
 
-[[nodiscard]] std::string in_words(const std::vector<PnpCell>& cells);
-[[nodiscard]] std::string in_words(const PnpVerdict& verdict);
+[[nodiscard]] std::string to_text(const std::vector<PnpCell>& cells);
+[[nodiscard]] std::string to_text(const PnpVerdict& verdict);
 [[nodiscard]] nlohmann::json to_json(const std::vector<PnpCell>& cells);
 [[nodiscard]] nlohmann::json to_json(const PnpVerdict& verdict);
 

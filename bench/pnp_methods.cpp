@@ -100,7 +100,7 @@ struct Residuals {
     }
 };
 
-/// The minimum of the least cost that these starts lead to. Its covariance is part of the work.
+/// The minimum of least cost that is reached from these starts. The time includes its covariance.
 PoseResult by_ceres(const PnpTrial& trial, std::span<const Rigid3> starts) {
     PoseResult best;
     double least = std::numeric_limits<double>::infinity();

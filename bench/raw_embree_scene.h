@@ -1,5 +1,5 @@
-/// bench/raw_embree_scene.h - all triangles of a scene in one Embree scene, as plain as Embree takes them:
-/// world axes, single precision, no instances, default build. What the bench holds narpa's own tracer against.
+/// bench/raw_embree_scene.h - all triangles of a scene in one Embree scene, as plain as Embree takes them: world
+/// axes, single precision, no instances, default build. The baseline for narpa's own tracer.
 #pragma once
 
 #include <tbb/blocked_range2d.h>

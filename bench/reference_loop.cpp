@@ -39,7 +39,7 @@ std::array<Vec3f, 2> across(const Vec3f& n) {
     const float s = std::copysign(1.0f, n.z), a = -1 / (s + n.z), b = n.x * n.y * a;
     return {Vec3f{1 + s * n.x * n.x * a, s * b, -s * n.x}, Vec3f{b, s + n.y * n.y * a, -n.y}};
 }
-/// The direction that stands `r` from the axis n at the angle 2 pi v.
+/// The unit direction at the angle asin(r) from the axis n and at the azimuth 2 pi v.
 Vec3f about(const Vec3f& n, float r, float v) {
     const auto [t, b] = across(n);
     const float angle = 2 * kPiFloat * v;
@@ -86,7 +86,7 @@ struct Incident {
     Rgb irradiance;  ///< on a surface that faces it, over the density with which it was chosen
 };
 
-/// A triangle that shines.
+/// An emissive triangle.
 struct LampFace {
     Vec3f corner, side, other_side, normal;  ///< normal: unit
     Rgb radiance_area;                       ///< radiance times area over the chance to be chosen, W sr^-1
@@ -193,7 +193,7 @@ std::uint64_t Loop::trace_shadows(Paths& p, const Source& source) const {
     return rays;
 }
 
-/// By direct light what shines is seen and lights nothing.
+/// With method direct, emissive surfaces are visible but light nothing.
 std::uint64_t Loop::light_directly(Paths& p, bool direct) const {
     std::uint64_t rays = 0;
     if (scene.sun) rays += trace_shadows(p, [&](const Point&, Counter& random) { return from_sun(random); });
@@ -202,7 +202,7 @@ std::uint64_t Loop::light_directly(Paths& p, bool direct) const {
     return rays;
 }
 
-/// From the camera's rays to their light.
+/// Traces the paths from their camera rays and accumulates their radiance.
 std::uint64_t Loop::trace(Paths& p, const FrameSettings& s) const {
     const bool direct = s.method == RenderSettings::Method::direct;
     std::uint64_t rays = 0;

@@ -1,7 +1,7 @@
-/// bench/reference_loop.h - a plain renderer to measure narpa's against: the loop that one writes over Embree
-/// in an afternoon. Sixteen rays at a time; the same number of samples for each pixel, jittered in strata;
-/// counter-based random numbers; Lambert and Phong; Sun with shadows; paths with cosine-distributed directions and
-/// next-event estimation of the Sun and one emissive surface. No adaptive sampling, no low-discrepancy points.
+/// bench/reference_loop.h - a plain renderer to compare narpa's with: a straightforward loop over Embree. Sixteen
+/// rays at a time; the same number of samples for each pixel, jittered in strata; counter-based random numbers;
+/// Lambert and Phong; Sun with shadows; paths with cosine-distributed directions and next-event estimation of the
+/// Sun and one emissive surface. No adaptive sampling, no low-discrepancy points.
 ///
 /// It converges to narpa's image of the same scene, which is what makes their times at equal error comparable.
 #pragma once
@@ -14,13 +14,13 @@
 
 namespace narpa {
 
-/// Of the settings: spp (each somewhere in the pixel, also where it is one), seed, frame, method, max_depth.
-/// Returns the number of rays. On the calling thread's TBB arena; same bytes on any number of threads.
+/// Uses these settings: spp (jittered in the pixel, also a single one), seed, frame, method, max_depth. Returns the
+/// number of rays. On the calling thread's TBB arena; same bytes on any number of threads.
 using ReferenceLoop = std::function<std::uint64_t(const Camera& camera, const Rigid3& T_world_camera,
                                                   const FrameSettings& settings, RadianceImage& out)>;
 
-/// Of meshes of flat faces, Lambert and Phong without textures, Sun, ambient and surfaces that shine; an Error for
-/// anything else. `scene` outlives it; the bodies stay where `at` has them now.
+/// Supports meshes of flat faces, Lambert and Phong without textures, Sun, ambient and emissive surfaces; an Error
+/// for anything else. `scene` outlives it; the bodies stay where `at` has them now.
 [[nodiscard]] Result<ReferenceLoop> reference_loop(const Scene& scene, const BodyPoses& at);
 
 }  // namespace narpa

@@ -158,9 +158,9 @@ std::vector<std::string> stereo_faults(const StereoBench& bench, int points) {
     if (static_cast<int>(bench.points.size()) < points)
         faults.push_back(fmt::format("{} points, expected {}", bench.points.size(), points));
     if (bench.points.empty()) return faults;
-    if (!(bench.gain() >= kLeastStereoGain))
+    if (!(bench.gain() >= kMinStereoGain))
         faults.push_back(fmt::format("depth errors {:.1f} times below those of whole pixels, expected {:g}",
-                                     bench.gain(), kLeastStereoGain));
+                                     bench.gain(), kMinStereoGain));
     const double statistics = 3 * std::sqrt(2 / static_cast<double>(bench.points.size()));
     for (const auto& [name, mean] : {std::pair{"depth errors", bench.mean_normalised_squared()},
                                      {"distances from the epipolar line", bench.mean_epipolar_squared()}})

@@ -24,8 +24,8 @@ struct StereoBenchPoint {
     double epipolar_sigmas = 0;
 };
 
-/// Of absolute values: quartiles; whiskers to the last value within 1.5 interquartile ranges of the box (Tukey
-/// 1977); the number beyond.
+/// Statistics of absolute values: quartiles; whiskers to the last value within 1.5 interquartile ranges of the box
+/// (Tukey 1977); the number beyond.
 struct Spread {
     std::array<double, 2> whiskers{};
     double lower_quartile = 0, median = 0, upper_quartile = 0;
@@ -43,9 +43,9 @@ struct StereoBench {
     StereoCounts counts;
     double render_s = 0, match_s = 0;
 
-    /// Of one axis (0 x, 1 y, 2 z), m; divided by the point's range: `relative`.
+    /// Errors along one axis (0 x, 1 y, 2 z), m; `relative`: divided by the point's range.
     [[nodiscard]] Spread errors(bool fine, int axis, bool relative) const;
-    /// RMS depth error over range: whole pixels over between pixels.
+    /// RMS depth error over range by whole pixels, over that by subpixel matches.
     [[nodiscard]] double gain() const;
     /// Means of the squared errors in predicted standard deviations, along the ray and across the epipolar line; 1
     /// is expected.
@@ -61,12 +61,12 @@ struct StereoBench {
 
 /// What is wrong, one sentence each: fewer points than this, a gain below 5, errors that are not as predicted
 /// (means off 1 by a factor of 1.5 and beyond three standard errors). Empty: nothing.
-inline constexpr double kLeastStereoGain = 5, kVarianceFactor = 1.5;
+inline constexpr double kMinStereoGain = 5, kVarianceFactor = 1.5;
 [[nodiscard]] std::vector<std::string> stereo_faults(const StereoBench& bench, int points);
 
 [[nodiscard]] nlohmann::json to_json(const StereoBench& bench);
 /// A table.
-[[nodiscard]] std::string in_words(const StereoBench& bench);
+[[nodiscard]] std::string to_text(const StereoBench& bench);
 /// Plots (plot/plot.h) the matches over the left frame, and the errors in x, y and z both ways, absolute and over
 /// range.
 [[nodiscard]] Status plot_stereo(const std::string& path, const StereoBench& bench);

@@ -81,7 +81,7 @@ Mesh mesh_of(TerrainMesh&& t) {
     return mesh;
 }
 
-/// Of these faces alone, in their order.
+/// The mesh of these faces alone, in their order.
 Mesh part_of(const Mesh& whole, const std::vector<bool>& faces) {
     Mesh part;
     part.name = "visible";
@@ -123,7 +123,7 @@ struct Traced {
     }
 };
 
-/// Straight down from a place, x to the right.
+/// A nadir view from a position, x to the right.
 class DownwardView {
 public:
     DownwardView(const TerrainCostSettings& s, const Vec3& from)
@@ -154,7 +154,6 @@ private:
     Vec3 from_;
 };
 
-/// CPU time of a ray.
 double ray_ns(const Traced& t, const DownwardView& view) {
     const BodyPoses at(1);
     HitBatch hits;
@@ -167,7 +166,7 @@ double ray_ns(const Traced& t, const DownwardView& view) {
     return 1e9 * (cpu_s(CLOCK_THREAD_CPUTIME_ID) - start_s) / static_cast<double>(rays_traced);
 }
 
-/// What side x side rays in each pixel meet.
+/// The faces that side x side rays in each pixel hit.
 struct Seen {
     std::vector<bool> faces;
     std::size_t rays = 0, missed = 0, from_below = 0;

@@ -1,4 +1,4 @@
-/// bench/terrain_cost.h - what a ray into terrain costs beside one into a mesh of the visible triangles alone.
+/// bench/terrain_cost.h - time of a ray into terrain over that of one into a mesh of the visible triangles alone.
 ///
 /// The ground is fractal and generated; a nadir-pointing camera descends over its middle. From each height the rays
 /// through all pixel centres are traced, 4 x 4 pixels together, into
@@ -6,8 +6,8 @@
 /// - a mesh of those of its triangles that the view sees: that any of 8 x 8 rays in a pixel meets;
 /// - a mesh of those that the rays through the pixel centres meet, a part of these where triangles are smaller than
 ///   pixels;
-/// - a terrain of the same ground with levels for this height alone.
-/// Times are CPU times of one thread; the candidates take turns, and medians count.
+/// - a terrain of the same ground with levels for this height alone. Times are CPU times of one thread; the
+/// candidates take turns, and medians are reported.
 #pragma once
 
 #include <functional>

@@ -20,7 +20,8 @@ set(NARPA_SANITIZED 0)
 if(NARPA_SANITIZE)
   set(NARPA_SANITIZED 1)
 endif()
-# Checks of every pointer: a quarter of the compile time, and what comes of such errors the address sanitizer reports.
+# UBSan's pointer checks are off: they cost a quarter of the compile time, and AddressSanitizer reports the resulting
+# errors.
 set(narpa_unchecked -fno-sanitize=null,alignment,object-size,pointer-overflow,vptr)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   set(narpa_unwanted_warnings -Wno-missing-braces -Wno-bitwise-instead-of-logical)  # loops over lanes have no branches
@@ -39,8 +40,8 @@ function(narpa_compile_options target)
                                            -Woverloaded-virtual $<$<BOOL:${NARPA_WERROR}>:-Werror>
                                            ${narpa_unwanted_warnings})
   target_compile_definitions(${target} PRIVATE NARPA_SANITIZED=${NARPA_SANITIZED})
-  # Same bytes on every machine with the same instruction set: no fused multiply-add behind our back. Nobody reads errno
-  # after sqrt.
+  # The same results on every machine with the same instruction set: the compiler may not contract to fused
+  # multiply-add. No code reads errno after sqrt.
   target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno)
   if(NARPA_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=${NARPA_SANITIZE} -fno-omit-frame-pointer
@@ -74,10 +75,10 @@ function(narpa_link target)
   endforeach()
 endfunction()
 
-# narpa_room(FOLDER [SIMD] [INTERNAL] LINKS ROOMS...) - one library of all sources below FOLDER except main.cpp. LINKS
-# names the rooms whose headers it may include; tests/layout holds every #include against these lists. SIMD: the room's
-# loops over the lanes of a ray batch are to become vector code. INTERNAL: it is not installed.
-function(narpa_room folder)
+# narpa_library(FOLDER [SIMD] [INTERNAL] LINKS LIBRARIES...) - one library of all sources below FOLDER except main.cpp.
+# LINKS names the libraries whose headers it may include; tests/layout checks every #include against these lists. SIMD:
+# loops over the lanes of a ray batch are to be vectorised. INTERNAL: it is not installed.
+function(narpa_library folder)
   cmake_parse_arguments(arg "SIMD;INTERNAL" "" "LINKS" ${ARGN})
   string(REPLACE "/" "_" name ${folder})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
@@ -90,22 +91,22 @@ function(narpa_room folder)
   set_target_properties(narpa_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_include_directories(narpa_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                   $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  foreach(room ${arg_LINKS})
-    string(REPLACE "/" "_" linked ${room})
+  foreach(library ${arg_LINKS})
+    string(REPLACE "/" "_" linked ${library})
     target_link_libraries(narpa_${name} PUBLIC narpa::${linked})
   endforeach()
   list(JOIN arg_LINKS " " links)
-  set_property(GLOBAL APPEND PROPERTY NARPA_ROOMS "${folder}: ${links}")
+  set_property(GLOBAL APPEND PROPERTY NARPA_LIBRARIES "${folder}: ${links}")
   narpa_compile_options(narpa_${name})
   if(NARPA_SANITIZE AND folder MATCHES "^(base|protocols|renderer|estimator)")
-    target_compile_options(narpa_${name} PRIVATE -O1)  # what computes; the rest compiles in half of the time without
+    target_compile_options(narpa_${name} PRIVATE -O1)  # folders that compute; others compile in half the time without
   endif()
   if(arg_SIMD)
     # GCC otherwise leaves most of these loops scalar. Neither option changes a result: no floating-point exception flag
     # is read, so both sides of a choice may be computed.
     target_compile_options(narpa_${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O3> -fno-trapping-math)
     if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
-      set_target_properties(narpa_${name} PROPERTIES UNITY_BUILD OFF)  # what is inlined where decides the vector code
+      set_target_properties(narpa_${name} PROPERTIES UNITY_BUILD OFF)  # inlining across sources changes the vector code
     endif()
   endif()
 endfunction()
@@ -120,7 +121,7 @@ endfunction()
 function(narpa_executable name)
   add_executable(${name} ${ARGN})
   if(TARGET narpa-mesh-reader AND NOT name STREQUAL "narpa-mesh-reader")
-    add_dependencies(${name} narpa-mesh-reader)  # any program that reads scenes starts it
+    add_dependencies(${name} narpa-mesh-reader)  # programs that read scenes start it
   endif()
   if(TARGET narpa-dem-reader AND NOT name STREQUAL "narpa-dem-reader")
     add_dependencies(${name} narpa-dem-reader)
@@ -132,14 +133,14 @@ function(narpa_install_package)
   set(dir ${CMAKE_INSTALL_LIBDIR}/cmake/narpa)
   get_property(components GLOBAL PROPERTY NARPA_COMPONENTS)
   list(REMOVE_DUPLICATES components)
-  get_property(rooms GLOBAL PROPERTY NARPA_ROOMS)
+  get_property(libraries GLOBAL PROPERTY NARPA_LIBRARIES)
   set(narpa_components "set(narpa_components ${components})\n")
   foreach(component ${components})
     install(EXPORT narpa-${component} NAMESPACE narpa:: DESTINATION ${dir} FILE narpa-${component}.cmake)
     set(uses "")
-    foreach(room ${rooms})
-      if(room MATCHES "^${component}[/:]")
-        string(REGEX REPLACE "^[^:]*:" "" links "${room}")
+    foreach(library ${libraries})
+      if(library MATCHES "^${component}[/:]")
+        string(REGEX REPLACE "^[^:]*:" "" links "${library}")
         string(REGEX MATCHALL "[a-z]+(/[a-z]+)?" links "${links}")
         list(TRANSFORM links REPLACE "/.*" "")
         list(APPEND uses ${links})

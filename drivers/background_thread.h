@@ -1,5 +1,5 @@
-/// drivers/background_thread.h - a thread that no signal reaches: signals belong to the thread that started the
-/// program.
+/// drivers/background_thread.h - starts a thread with all signals blocked: the thread that started the program
+/// handles them.
 #pragma once
 
 #include <pthread.h>

@@ -11,7 +11,7 @@ namespace narpa {
 
 struct TcpListener {
     Descriptor fd;           ///< accepts without blocking
-    std::uint16_t port = 0;  ///< that was asked for, or the free one that 0 asked for
+    std::uint16_t port = 0;  ///< as requested; for 0, the free one that the kernel chose
 };
 /// `address`: IPv4. Errors: no such address, or one that cannot be bound.
 [[nodiscard]] Result<TcpListener> listen_tcp(const std::string& address, std::uint16_t port);

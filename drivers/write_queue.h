@@ -4,7 +4,7 @@
 /// One thread pushes, one thread (the queue's own) writes. After construction neither side allocates or takes a
 /// lock: the slots are handed over by two atomic counts; a POSIX semaphore counts the free slots (libstdc++ 12's
 /// std::counting_semaphore can miss a wake-up, GCC bug 104928), and an eventfd wakes the writer, which can poll its
-/// reader's descriptor at the same time. That poll is why no ring of a library serves here.
+/// reader's descriptor at the same time. Ring buffers of libraries do not offer that poll.
 #pragma once
 
 #include <semaphore.h>
@@ -28,7 +28,7 @@ public:
     virtual void write(std::span<const std::uint8_t> item, const WriteQueue& queue) noexcept = 0;
     /// The item is dropped unwritten: a flush ran out of time.
     virtual void abandon(std::span<const std::uint8_t> item) noexcept = 0;
-    /// Passes what was written on to the system: within about kSync_ns of each write.
+    /// Hands written data to the operating system. Called within about kSync_ns of each write.
     virtual void sync() noexcept {}
     /// Descriptor that is polled for hang-up and errors while the ring is empty; `lost` is then called. -1: none.
     [[nodiscard]] virtual int watched() const noexcept { return -1; }
@@ -51,7 +51,8 @@ public:
     bool push(std::span<const std::uint8_t> head, std::span<const std::uint8_t> rest) noexcept;
     /// Gives the writer one second for what is still in the ring, drops the rest. Called by the pushing thread.
     void flush() noexcept;
-    /// Less than half of the slots are free, and a push would not wait: what matters less is better left out.
+    /// Less than half of the slots are free, and a push would not wait: the caller should leave out less important
+    /// items.
     [[nodiscard]] bool crowded() noexcept;
     [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 

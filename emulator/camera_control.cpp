@@ -9,8 +9,8 @@
 namespace narpa {
 namespace {
 
-constexpr int kMostBinning = 16;
-constexpr std::int64_t kMostPeriodNs = 1'000'000'000'000;
+constexpr int kMaxBinning = 16;
+constexpr std::int64_t kMaxPeriodNs = 1'000'000'000'000;
 
 bool runs_free(const CameraSettings& s) noexcept {
     return s.running && s.trigger == TriggerMode::free_running;
@@ -72,7 +72,7 @@ CameraControl::CameraControl(const Camera& camera, std::uint8_t index)
       width_(camera.width),
       height_(camera.height),
       rows_ns_(rows_ns(camera)),
-      least_period_ns_(camera.period_ns),
+      min_period_ns_(camera.period_ns),
       latest_(settings_of(camera)),
       t_next_trigger_ns_(0),
       exposure_ns_(latest_.exposure_ns),
@@ -98,7 +98,7 @@ CameraReply CameraControl::command(const CameraCommand& command, std::int64_t t_
         return reply;
     }
     ++counters_.commands;
-    if (changes_mode) {  // the triggers after t_ns come to nothing
+    if (changes_mode) {  // triggers after t_ns are dropped
         ++latest_mode_;
         t_next_trigger_ns_ = std::min(t_next_trigger_ns_, t_ns + latest_.period_ns);
     }
@@ -112,14 +112,14 @@ CameraAnswer CameraControl::check(const CameraCommand& command, const CameraSett
     const int right = wanted.region.x + wanted.region.width, bottom = wanted.region.y + wanted.region.height;
     const bool pairs = format_ == PixelFormat::yuyv;
     if (command.exposure_ns && wanted.auto_exposure) return auto_exposure;
-    if (wanted.period_ns > kMostPeriodNs || wanted.period_ns < least_period_ns_) return period_range;
+    if (wanted.period_ns > kMaxPeriodNs || wanted.period_ns < min_period_ns_) return period_range;
     if (wanted.exposure_ns < limits_.exposure_min_ns || wanted.exposure_ns > longest_ns(wanted))
         return exposure_range;
     if (wanted.gain_cdb < 0 || wanted.gain_cdb > limits_.gain_max_cdb) return gain_range;
     if (wanted.region.width == 0 || wanted.region.height == 0 || right > width_ || bottom > height_ ||
         (pairs && (wanted.region.x % 2 != 0 || wanted.region.width % 2 != 0)))
         return region_range;
-    if (wanted.binning < 1 || wanted.binning > (can_bin(format_) ? kMostBinning : 1)) return binning_range;
+    if (wanted.binning < 1 || wanted.binning > (can_bin(format_) ? kMaxBinning : 1)) return binning_range;
     return accepted;
 }
 
@@ -163,9 +163,9 @@ void CameraControl::plan() noexcept {
     t_start_ns_ = runs_free(settings_) ? t_mid_ns_ - image_ns(settings_) / 2 : t_trigger_ns();
 }
 
-/// Adopts an order that acts on the next exposure, or drops a trigger of a mode that was left. False: neither.
+/// Adopts an order that takes effect with the next exposure, or drops a trigger of an earlier mode. False: neither.
 bool CameraControl::adopt_next() noexcept {
-    // Orders first: whoever has seen one sees the triggers that came before it.
+    // Orders first: once an order is visible, so are the triggers that were pushed before it.
     if (Order order; !order_ && orders_.pop(order)) order_ = order;
     if (Trigger trigger; !trigger_ && triggers_.pop(trigger)) trigger_ = trigger;
     if (trigger_ && trigger_->mode < mode_) {

@@ -23,11 +23,11 @@ namespace narpa {
 /// From the start of the first row's exposure to the end of the last one's; 0 without a detector.
 [[nodiscard]] std::int64_t exposure_ns(const Camera& camera) noexcept;
 
-/// As the scene has them.
+/// The settings of the camera in the scene.
 [[nodiscard]] CameraSettings settings_of(const Camera& camera) noexcept;
-/// As the frame was taken with; of trigger, period and auto-exposure the scene's.
+/// The settings of a logged frame; trigger, period and auto-exposure are those of the scene.
 [[nodiscard]] CameraSettings settings_of(const FrameLedger& ledger, const Camera& as_in_the_scene) noexcept;
-/// The camera with these settings; of region, binning and trigger nothing.
+/// Sets exposure time and gain of `camera`; other settings have no effect on it.
 void apply(const CameraSettings& settings, const Camera& as_in_the_scene, Camera& camera) noexcept;
 
 struct CameraControlCounters {
@@ -45,9 +45,9 @@ public:
 
     [[nodiscard]] CameraReply command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
     [[nodiscard]] CameraReply trigger(const CameraTrigger& trigger, std::int64_t t_now_ns) noexcept;
-    /// Of a SYNC object: exposes one frame at t_ns where the camera is in that mode.
+    /// On a SYNC object: exposes one frame at t_ns if the camera is in that trigger mode.
     void sync(std::int64_t t_ns, std::int64_t t_now_ns) noexcept;
-    /// Runs in this mode, once all commands so far act.
+    /// True if the camera runs in this mode once all commands so far are in effect.
     [[nodiscard]] bool awaits(TriggerMode mode) const noexcept {
         return latest_.running && latest_.trigger == mode;
     }
@@ -60,16 +60,17 @@ public:
 
     // From the camera's thread.
 
-    /// Takes what has come and plans the next exposure.
+    /// Applies received commands and triggers, and plans the next exposure.
     void plan() noexcept;
     /// Free-running frames are at multiples of the period, from this time on.
     void start_at(std::int64_t t_ns) noexcept;
     /// Start of the next exposure; Clock::kNever while none is known.
     [[nodiscard]] std::int64_t t_start_ns() const noexcept { return t_start_ns_; }
-    /// Of the next exposure.
+    /// Settings of the next exposure.
     [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
     [[nodiscard]] std::uint8_t command_counter() const noexcept { return command_counter_; }
-    /// The exposure was taken or skipped: the next one. `level`: mean of its image, of full scale; absent: skipped.
+    /// Goes on to the next exposure after one was taken or skipped. `level`: mean of its image, as a fraction of
+    /// full scale; absent: skipped.
     void advance(std::optional<double> level) noexcept;
 
 private:
@@ -81,12 +82,12 @@ private:
     };
     struct Trigger {
         std::int64_t t_ns = 0;
-        std::uint64_t mode = 0;  ///< the one that it is for
+        std::uint64_t mode = 0;  ///< value of this count for which it was accepted
     };
     [[nodiscard]] CameraAnswer check(const CameraCommand& command, const CameraSettings& wanted) const noexcept;
     [[nodiscard]] CameraAnswer take_trigger(TriggerMode mode, std::int64_t t_ns, std::int64_t t_now_ns) noexcept;
     bool adopt_next() noexcept;
-    /// Of the next exposure that is not free-running.
+    /// Start of the next exposure that is not free-running.
     [[nodiscard]] std::int64_t t_trigger_ns() const noexcept {
         return trigger_ && trigger_->mode == mode_ ? trigger_->t_ns : Clock::kNever;
     }
@@ -101,9 +102,9 @@ private:
     const std::uint8_t index_;
     const PixelFormat format_;
     const int width_, height_;
-    const std::int64_t rows_ns_, least_period_ns_;
+    const std::int64_t rows_ns_, min_period_ns_;
 
-    // The CAN thread's.
+    // Used by the CAN thread.
     CameraSettings latest_;  ///< accepted, in effect or not
     std::uint64_t latest_mode_ = 0;
     std::int64_t t_next_trigger_ns_;  ///< the earliest start that a trigger may have
@@ -111,10 +112,10 @@ private:
 
     SpscRing<Order, 64> orders_;
     SpscRing<Trigger, 64> triggers_;
-    std::atomic<std::int64_t> exposure_ns_;  ///< as auto-exposure has it
+    std::atomic<std::int64_t> exposure_ns_;  ///< as set by auto-exposure
     std::atomic<std::uint64_t> dropped_{0};
 
-    // The camera's thread's.
+    // Used by the camera's thread.
     CameraSettings settings_;
     std::uint8_t command_counter_ = 0;
     std::uint64_t mode_ = 0;

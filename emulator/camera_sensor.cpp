@@ -154,7 +154,7 @@ void CameraSensor::skip_missed(const Clock& clock) noexcept {
     for (; missed(); advance(std::nullopt)) ++stats_.skipped;
 }
 
-/// What the reader of a sink has set is a command like those of CAN, and answered there.
+/// Passes on settings from the readers of sinks as camera commands; the replies go to the CAN bus.
 void CameraSensor::take_requests(CanNode& can, std::int64_t t_ns) noexcept {
     for (const auto& sink : sinks_)
         for (VideoRequest r; sink->next_request(r);) {
@@ -196,7 +196,7 @@ void CameraSensor::log(const FrameLedger& l) noexcept {
     append(l.t_exposure_start_ns, unit_.motions_at_start());
     append(l.t_exposure_mid_ns, unit_.motions());
     append(l.t_exposure_end_ns, unit_.motions_at_end());
-    // After the hand-over, which so never waits for it.
+    // After the hand-over, which therefore never waits for the log.
     ledger_log_->append({row.data(), format_ledger_row(row, l, image_crc32(unit_.bytes()))});
     sheet_->offer(l.frame, l.t_exposure_mid_ns, unit_.bytes());
 }

@@ -29,10 +29,10 @@ struct CameraStats {
     std::uint64_t stale = 0;                               ///< frames that show a body without a fresh command
     std::uint64_t repeated = 0, blanked = 0;               ///< handed over in place of late frames
     std::uint64_t ledgers_lost = 0, states_lost = 0;       ///< the CAN thread did not keep up
-    std::array<std::uint64_t, kStepNames.size()> steps{};  ///< frames that got so far
+    std::array<std::uint64_t, kStepNames.size()> steps{};  ///< frames by the step that they reached
     Histogram wake_late, render, hand_over;  ///< after it was due; duration; from mid-exposure to hand-over
-    Histogram radiance, sensor, send;        ///< parts of it: durations
-    SignedHistogram late;              ///< hand-over (of what is late and dropped: its end) after the deadline
+    Histogram radiance, sensor, send;        ///< durations of parts of a frame
+    SignedHistogram late;  ///< from deadline to hand-over, or to the end of a late frame that is dropped
     Histogram error_1e9, samples_1e3;  ///< expected error, 1e-9 of full scale; samples per pixel, 1e-3
 };
 
@@ -72,7 +72,7 @@ public:
     [[nodiscard]] std::uint64_t drops() const noexcept override;
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
-    [[nodiscard]] std::string in_words(bool lockstep) const override;
+    [[nodiscard]] std::string to_text(bool lockstep) const override;
 
     [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
     /// Null where the scene has no `control`.
@@ -85,7 +85,7 @@ public:
 private:
     /// Hands over the frame just rendered, by the late policy, and completes its ledger.
     void hand_over(FrameLedger& ledger, const Clock& clock) noexcept;
-    /// Of the next frame's hand-over: the end of the time budget, or the middle of the exposure after it.
+    /// Deadline of the next frame's hand-over: the end of the time budget, or the middle of the exposure after it.
     [[nodiscard]] std::int64_t deadline_ns() const noexcept;
     /// The next frame was exposed or skipped. `level`: CameraControl::advance.
     void advance(std::optional<double> level) noexcept;
@@ -108,7 +108,7 @@ private:
     SpscRing<FrameLedger, 64> ledgers_;
     SpscRing<CameraState, 64> states_;  ///< of a camera that is operated
     bool keeps_ledgers_ = false;
-    std::uint8_t requests_ = 0;  ///< that readers have made; the CAN thread's
+    std::uint8_t requests_ = 0;  ///< made by readers so far; used by the CAN thread
     OnlineEstimator* estimator_ = nullptr;
     CameraStats stats_;
 

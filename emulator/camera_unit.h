@@ -16,8 +16,8 @@
 
 namespace narpa {
 
-/// Of the noise and the samples of a scene's camera: cameras that look at the same things share none of them. The
-/// first has the scene's seed.
+/// Seed of the noise and samples of a camera. Each camera of a scene has its own, so that their noise is
+/// independent; the first has the scene's.
 [[nodiscard]] constexpr std::uint64_t seed_of_camera(std::uint64_t scene_seed, std::size_t index) noexcept {
     return scene_seed + index * 0x9e3779b97f4a7c15u;  // 2^64 over the golden ratio (D. E. Knuth, TAOCP 3, 6.4)
 }
@@ -26,8 +26,8 @@ namespace narpa {
 /// fraction of it.
 [[nodiscard]] double full_scale_radiance(const Camera& camera) noexcept;
 
-/// Where the camera is during an exposure from the first row's start to the last one's end in which the bodies move
-/// as in `at`, and when it takes which row. `motions`: of every body at mid-exposure.
+/// Pose of the camera during an exposure, from the first row's start to the last one's end, with the times of its
+/// rows. The bodies move as in `at`. `motions`: of every body at mid-exposure.
 [[nodiscard]] CameraPose camera_pose(const World& world, const Camera& camera, const BodyPoses& at,
                                      std::int64_t start_ns, std::int64_t end_ns,
                                      std::span<const Motion> motions) noexcept;
@@ -68,7 +68,7 @@ public:
     /// `pixels_done` counts the finished pixels, for a progress display; may be null.
     FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, std::int64_t deadline_ns = 0,
                        Aovs* aovs = nullptr, std::atomic<std::size_t>* pixels_done = nullptr);
-    /// Of the frames from now on. Only for a camera that is operated (Camera::control).
+    /// Settings of all later frames. Only for a camera that is operated (Camera::control).
     void set(const CameraSettings& settings, std::uint8_t command_counter) noexcept;
     [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
     [[nodiscard]] std::uint8_t command_counter() const noexcept { return command_counter_; }
@@ -82,9 +82,9 @@ public:
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
     [[nodiscard]] const RadianceImage& radiance() const noexcept { return radiance_; }
     [[nodiscard]] const BodyPoses& placement() const noexcept { return placement_; }
-    /// Of the last frame.
+    /// Durations of the last frame.
     [[nodiscard]] const FrameDurations& durations() const noexcept { return durations_; }
-    /// Of every body at mid-exposure of the last frame.
+    /// Motion of every body at mid-exposure of the last frame.
     [[nodiscard]] std::span<const Motion> motions() const noexcept { return motions_; }
     /// The same at the exposure's start and end; empty where the camera has no shutter.
     [[nodiscard]] std::span<const Motion> motions_at_start() const noexcept { return starts_; }

@@ -49,7 +49,7 @@ bool CanNode::next_frame(std::int64_t t_now_ns) noexcept {
     return !waiting_;
 }
 
-/// The status of the body or camera whose frame it is.
+/// Returns the status of the body or camera to which the frame belongs.
 PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept {
     if (!cameras_.empty())
         if (const DecodeStatus status = take_camera_message(frame, t_now_ns); status != DecodeStatus::not_mine)
@@ -199,7 +199,7 @@ void CanNode::repeat_heartbeat() noexcept {
 }
 
 void CanNode::put(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
-    if (bus_.recorded() || bus_.send(frame)) log_frame(frame, t_now_ns);  // nobody hears a recorded bus
+    if (bus_.recorded() || bus_.send(frame)) log_frame(frame, t_now_ns);  // a recorded bus has no receivers
 }
 
 void CanNode::log_frame(const CanFrame& frame, std::int64_t t_ns, std::string_view interface) noexcept {

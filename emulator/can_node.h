@@ -21,9 +21,9 @@ namespace narpa {
 struct CommandCounters {
     std::uint64_t taken = 0;          ///< complete commands accepted by a track
     std::uint64_t past = 0;           ///< time of validity not after the newest: late, repeated, out of order
-    std::uint64_t overrun = 0;        ///< further ahead than the track is deep
+    std::uint64_t overrun = 0;        ///< too far ahead for the depth of the track
     std::uint64_t too_far_ahead = 0;  ///< time of validity beyond the scene's command_ahead_max_s
-    std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< frames and sets of bodies and cameras
+    std::array<std::uint64_t, kDecodeStatusCount> by_status{};  ///< of frames and sets to bodies and cameras
     std::uint64_t foreign = 0;                                  ///< frames of other identifiers
     std::uint64_t not_logged = 0;                               ///< frames left out of the log
     std::uint64_t missed = 0;                                   ///< lost commands, by gaps in the counters
@@ -46,7 +46,8 @@ class CanNode {
 public:
     static constexpr std::uint64_t kOtherFramesPerSecond = 10'000;
     static constexpr std::size_t kLogLines = 16'384;
-    /// So many commands of a body refused in a row are no repeats of a bus: the sender's clock or rate is wrong.
+    /// This many refused commands of a body in a row are not repeats by the bus: the sender's clock or rate is
+    /// wrong.
     static constexpr std::uint32_t kManyRefused = 10;
 
     /// `log` may be null. All outlive the node. In real time frames of a recorded bus wait for their time; in
@@ -73,23 +74,23 @@ public:
     /// Sends the last heartbeat again, for clients that have joined since; not where the bus knows that there are
     /// none. It is not logged: a log in lockstep does not depend on wall time.
     void repeat_heartbeat() noexcept;
-    /// A camera's command that came another way than over the bus; its answer goes there as well.
+    /// A command to a camera from another source than the bus; the reply goes to the bus as well.
     void command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
-    /// Commands and triggers go to this camera too, which outlives the run. Before it.
+    /// Sends commands and triggers to this camera too, which must outlive the run. Call before the run.
     void operate(CameraControl& camera) { cameras_.push_back(&camera); }
 
-    /// The times up to and from which every commanded body has commands: the limits of a lockstep run's clock.
-    /// `commanded` is false until every commanded body has a command.
+    /// The latest and first time for which every commanded body has commands: they limit the clock of a lockstep
+    /// run. `commanded` is false until every commanded body has a command.
     [[nodiscard]] bool commanded() const noexcept;
     [[nodiscard]] std::int64_t granted_ns() const noexcept;
     [[nodiscard]] std::int64_t first_ns() const noexcept;
 
     [[nodiscard]] CommandCounters counters() const noexcept;
-    /// Commands refused for that so far.
+    /// Commands refused so far because they were too far ahead.
     [[nodiscard]] std::uint64_t too_far_ahead() const noexcept { return counters_.too_far_ahead; }
     /// The bodies of which kManyRefused commands in a row were refused as past or overrun.
     [[nodiscard]] std::vector<RefusedPoses> refused_poses() const;
-    /// One of these two was worth a notice.
+    /// True if one of these two calls for a notice to the user.
     [[nodiscard]] bool refuses_poses() const noexcept { return many_refused_ || counters_.too_far_ahead > 0; }
 
 private:

@@ -12,7 +12,7 @@
 
 namespace narpa {
 
-/// What a sensor may read of the clock. One clock per run; any thread may read it.
+/// The part of the clock that sensors read. One clock per run; any thread may read it.
 class Clock {
 public:
     static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
@@ -22,7 +22,7 @@ public:
     /// Simulation time `t_ns` on CLOCK_MONOTONIC.
     [[nodiscard]] virtual std::int64_t to_monotonic(std::int64_t t_ns) const noexcept = 0;
 
-    /// The run ends here; kNever: when it is stopped.
+    /// End of the run; kNever: it runs until it is stopped.
     [[nodiscard]] std::int64_t end_ns() const noexcept { return end_ns_.load(std::memory_order_relaxed); }
     void end_at(std::int64_t t_ns) noexcept { end_ns_.store(t_ns, std::memory_order_relaxed); }
 
@@ -56,19 +56,19 @@ private:
     std::int64_t start_ns_ = 0;
 };
 
-/// The first time after `now_ns` of those that follow `due_ns` in steps of the period: missed ones are skipped.
+/// The first of the times due_ns + k * period_ns after `now_ns`: missed ones are skipped.
 [[nodiscard]] constexpr std::int64_t next_due_ns(std::int64_t due_ns, std::int64_t period_ns,
                                                  std::int64_t now_ns) noexcept {
     return due_ns + ((now_ns - due_ns) / period_ns + 1) * period_ns;
 }
 
-/// Stands still while a sensor works: everything takes no time, so no wall time enters any result.
+/// Stands still while a sensor works: work takes no simulation time, so results do not depend on wall time.
 class LockstepClock final : public Clock {
 public:
     void set(std::int64_t t_ns) noexcept { now_ns_ = t_ns; }
 
     [[nodiscard]] std::int64_t now_ns() const noexcept override { return now_ns_; }
-    /// Now, whatever the time: nothing in lockstep waits for it.
+    /// The current time for every `t_ns`: nothing in lockstep waits for it.
     [[nodiscard]] std::int64_t to_monotonic(std::int64_t) const noexcept override { return monotonic_ns(); }
 
 private:

@@ -73,8 +73,8 @@ Result<std::vector<std::unique_ptr<Sink>>> open_sinks(
     return sinks;
 }
 
-/// What readers of the camera's frames may set. Requests go the way of CAN's commands, so without a bus there are
-/// none.
+/// The settings that readers of the camera's frames may change. Their requests are handled like commands on CAN, so
+/// without a bus there are none.
 std::optional<VideoControls> controls_of(const Camera& c, bool has_bus) {
     if (!c.control || !has_bus) return std::nullopt;
     const CameraSettings s = settings_of(c);
@@ -108,11 +108,11 @@ Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& f
     const LidarSpec& spec = lidar.model->spec();
     const double shots_hz =
         1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
-    if (shots_hz <= LidarSensor::kMostBeams_hz) return Ok{};
+    if (shots_hz <= LidarSensor::kMaxBeams_hz) return Ok{};
     return Error{
         fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
                     "frames)",
-                    lidar.name, shots_hz, LidarSensor::kMostBeams_hz),
+                    lidar.name, shots_hz, LidarSensor::kMaxBeams_hz),
         file};
 }
 
@@ -230,7 +230,7 @@ Status Emulator::open() {
         if (!estimator) return estimator.error();
         estimator_ = *std::move(estimator);
     }
-    if (logs)  // last: a run that cannot start leaves the log of an earlier one
+    if (logs)  // last, so that a run that cannot start keeps the log of an earlier one
         if (auto opened = open_logs(); !opened) return opened;
     if (!bus_) return Ok{};
     can_ = std::make_unique<CanNode>(*world_, *bus_, can_log_.get(), options_.lockstep);

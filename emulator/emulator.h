@@ -63,10 +63,10 @@ public:
     [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
     /// Simulation time reached. From any thread.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_.load(std::memory_order_relaxed); }
-    /// In real time, from time 0 to the last item.
+    /// Page faults of a run in real time, from time 0 to the last item.
     [[nodiscard]] PageFaults page_faults() const noexcept { return page_faults_; }
-    /// What the user should know of the run: what the kernel did not permit, what was refused or left out. Filled
-    /// by `run`.
+    /// Messages about the run for the user: what the kernel did not permit, what was refused or left out. Filled by
+    /// `run`.
     [[nodiscard]] const std::vector<std::string>& notices() const noexcept { return notices_; }
     /// `run` was stopped by its flag: it did not end by itself.
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
@@ -79,7 +79,7 @@ private:
 
     Emulator();
     Status open();
-    /// In place of those of an earlier run in the folder.
+    /// Replaces the logs of an earlier run in the folder.
     Status open_logs();
 
     void run_real_time(const StopFlag& stop);
@@ -88,8 +88,8 @@ private:
     void run_bus(RealTimeRun& run, const StopFlag& stop);
     void run_estimator(const StopFlag& stop);
 
-    /// On the CAN bus, if there is one: what sensors and estimator have gathered; the state with the faults since
-    /// the last heartbeat. One thread calls them.
+    /// Send on the CAN bus, if any: what sensors and estimator have gathered; the state, with the faults since the
+    /// last heartbeat. One thread calls them.
     void send_telemetry(std::int64_t t_ns) noexcept;
     void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
 

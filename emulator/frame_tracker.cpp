@@ -13,10 +13,10 @@
 namespace narpa {
 namespace {
 
-/// Of what is known about velocity and rate before a second frame has been seen.
+/// Initial standard deviations of velocity and rate, until the second frame.
 constexpr double kFirstVelocity_m_s = 1, kFirstRate_rad_s = 0.1;
-/// Standard deviations beyond which the target is lost: a render there would show something else. Shift is a part
-/// of the range.
+/// Standard deviations beyond which the target counts as lost, because a render would not match the frame.
+/// kLostShift is a fraction of the range.
 constexpr double kLostTurn_rad = 0.5, kLostShift = 0.2;
 
 PoseTrackerSettings tracker_settings(const TrackerOptions& options) {
@@ -28,7 +28,7 @@ PoseTrackerSettings tracker_settings(const TrackerOptions& options) {
     return settings;
 }
 
-/// The answer of a method, and where it is usable, the pose and its covariance.
+/// Copies the answer of a method and, where it is usable, the pose and its covariance.
 void take_answer(const auto& estimate, const Rigid3& pose, TrackedFrame& out) {
     out.answer = estimate.answer;
     out.why = estimate.answer.why;
@@ -62,7 +62,7 @@ Result<std::size_t> target_of(const World& world, int mount, std::string_view se
         world.scene().file};
 }
 
-Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
+Rigid3 displaced_truth(const Rigid3& truth, const TrackerOptions& o, std::mt19937_64& random) {
     return displaced(truth, random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(truth.t), random));
 }
 
@@ -90,7 +90,7 @@ FrameTracker::FrameTracker(const World& world, std::size_t camera, std::size_t t
     FeatureSettings features;
     features.spp = options.spp;
     features.model = options.model;
-    features.seed = ~options.seed;  // not the random numbers of the frames, whose seed may be the same
+    features.seed = ~options.seed;  // independent of the frames, whose seed may be the same
     features_ = std::make_unique<FeatureAlignment>(world.render_scene(), camera_, target,
                                                    BodyPoses(world.scene().bodies.size()), features);
     if (options.method == CameraMethod::dense)
@@ -156,7 +156,7 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     if (tracker_.started()) {
         out.guess = inverse(T_chaser_camera()) * tracker_.filter().pose(q_frame_chaser).T_chaser_target;
     } else if (!searches()) {
-        out.guess = options_.guess ? *options_.guess : off_truth(out.truth, options_, random_);
+        out.guess = options_.guess ? *options_.guess : displaced_truth(out.truth, options_, random_);
     }
     const ApparentMotion moving = motion(ledger, at, out.guess);
     const bool searched = searches();
@@ -165,7 +165,7 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     else
         out.why = usable.error().what;
     if (out.measured) {
-        // What the model's errors do is the same in all frames.
+        // The model's errors are common to all frames, so the filter gets the covariance without them.
         PoseMeasurement measurement{t_ns, *out.measured, out.covariance - out.covariance_of_model,
                                     T_chaser_camera(), q_frame_chaser};
         if (out.answer.kind == AnswerKind::unobservable) measurement.root_information = out.answer.root_information;
@@ -265,7 +265,8 @@ std::vector<float> FrameTracker::frame_variance() const {
                               static_cast<float>(std::pow(*options_.frame_noise_dn, 2)));
 }
 
-/// Without a truth the target's attitude in the world, and so its light, is not known but by the camera's.
+/// Without a truth, the target's attitude in the world, and so its illumination, is known only through the camera's
+/// attitude.
 DenseOptions FrameTracker::dense_options(const ApparentMotion& motion, const Rigid3& T_world_camera) const {
     DenseOptions dense;
     dense.motion = motion;

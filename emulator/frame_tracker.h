@@ -33,19 +33,20 @@ struct TrackerOptions {
     std::string target;  ///< name of the body; empty: the first with a mesh that does not carry the camera
     CameraMethod method = CameraMethod::features;  ///< dense starts from where the features lead
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
-    bool search = false;                      ///< no guess but of the range, known to 30 % (estimator/search)
-    double range_guess_m = 0;                 ///< for the search; 0: the truth, off by up to 30 %, or the guess
-    /// T_camera_target of the first frame, where there is no truth: the target's pose of a frame is only its light,
-    /// and the measure of a search's range. Dense and search take the light from the camera's attitude.
+    bool search = false;       ///< without an initial pose, from a range known to 30 % (estimator/search)
+    double range_guess_m = 0;  ///< for the search; 0: the truth, off by up to 30 %, or the guess
+    /// T_camera_target of the first frame where there is no truth. The target's pose in `at` then only gives its
+    /// illumination and the range of a search. Dense and search take the illumination from the camera's attitude
+    /// instead.
     std::optional<Rigid3> guess{};
     ModelUncertainty model{};
-    /// Standard deviation of the frames' noise beside the detector's, for pixels; 0: none, as of a real camera.
-    /// Empty: not known, as of renders of few samples.
+    /// Standard deviation of further noise of the frames, besides the detector's, for the methods that compare
+    /// pixels; 0: none, as with a real camera. Empty: unknown, as with renders of few samples.
     std::optional<double> frame_noise_dn{};
     std::uint64_t seed = 1;  ///< of the first guess's direction
     int spp = 4;             ///< of the renders that frames are compared with
-    /// What drives the relative motion beyond a constant velocity and rate: power spectral densities, m^2 s^-3 and
-    /// rad^2 s^-3. As a chaser's that brakes with some cm s^-2.
+    /// Process noise of the relative motion, beyond a constant velocity and rate: power spectral densities, m^2
+    /// s^-3 and rad^2 s^-3. The defaults suit a chaser that brakes with some cm s^-2.
     double acceleration_psd = 1e-3, angular_acceleration_psd = 1e-5;
 };
 
@@ -53,7 +54,7 @@ struct TrackerOptions {
 [[nodiscard]] Result<std::size_t> target_of(const World& world, int mount, std::string_view sensor,
                                             const std::string& name);
 /// The truth displaced by the start errors of the options, in directions drawn at random.
-[[nodiscard]] Rigid3 off_truth(const Rigid3& truth, const TrackerOptions& options, std::mt19937_64& random);
+[[nodiscard]] Rigid3 displaced_truth(const Rigid3& truth, const TrackerOptions& options, std::mt19937_64& random);
 
 /// The result of one frame. Poses are T_camera_target, errors and covariances as in estimator/pose/pose_estimate.h.
 struct TrackedFrame {
@@ -97,24 +98,24 @@ public:
 
 private:
     FrameTracker(const World& world, std::size_t camera, std::size_t target, const TrackerOptions& options);
-    /// Of `camera_`, from what the frame was taken with. An Error where its pixels are not the scene's.
+    /// Sets `camera_` to the settings of the frame. An Error where its pixels are not the scene's.
     [[nodiscard]] Status set(const FrameLedger& ledger);
-    /// Of the target in camera axes during the exposure, by the filter and the camera's own attitude; 0 without a
-    /// shutter.
+    /// Motion of the target in camera axes during the exposure, from the filter and the camera's own attitude; 0
+    /// without a shutter.
     [[nodiscard]] ApparentMotion motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const;
-    [[nodiscard]] bool searches() const;  ///< the next frame: there is no pose yet
+    [[nodiscard]] bool searches() const;  ///< the next frame is searched: there is no pose yet
     void measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const Rigid3& T_world_camera,
                  const ApparentMotion& motion, TrackedFrame& out);
     void measure_by_features(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
                              TrackedFrame& out);
     void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const DenseOptions& options,
                            TrackedFrame& out);
-    /// Without a guess; the target is taken to stand still during the exposure.
+    /// Without a guess. Assumes that the target stands still during the exposure.
     void measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
                            TrackedFrame& out);
     [[nodiscard]] DenseOptions dense_options(const ApparentMotion& motion, const Rigid3& T_world_camera) const;
     [[nodiscard]] std::vector<float> frame_variance() const;  ///< of each pixel; empty: not known
-    /// The pose is known well enough for a render to be compared from there.
+    /// The pose is accurate enough to start an alignment of a render.
     [[nodiscard]] bool is_tracked(const Quat& q_frame_chaser) const;
     /// The chaser is the body that carries the camera, or the camera itself.
     [[nodiscard]] Rigid3 T_chaser_camera() const { return camera_.mount < 0 ? Rigid3{} : camera_.T_mount_camera; }
@@ -128,8 +129,8 @@ private:
     std::unique_ptr<DenseAlignment> pixels_;  ///< by method `dense`
     std::unique_ptr<PoseSearch> search_;      ///< where the options ask for it
     PoseTracker tracker_;
-    /// Of the newest measurement that the filter took: the same in all of them, so that the filter does not average
-    /// it.
+    /// Of the newest measurement that the filter took. This part is common to all measurements, so the filter must
+    /// not average it.
     Matrix6 covariance_of_model_ = Matrix6::Zero();
 };
 

@@ -29,9 +29,9 @@ public:
     LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
                 bool truth = false);
 
-    /// Keeps each shot's report for send_telemetry. At most kMostBeams_hz shots a second.
+    /// Keeps each shot's report for send_telemetry. At most kMaxBeams_hz shots a second.
     void keep_beams() noexcept { keeps_beams_ = true; }
-    static constexpr double kMostBeams_hz = 1000;
+    static constexpr double kMaxBeams_hz = 1000;
 
     [[nodiscard]] std::string_view kind() const noexcept override { return "lidar"; }
     [[nodiscard]] std::string_view name() const noexcept override { return unit_.lidar().name; }
@@ -50,7 +50,7 @@ public:
     [[nodiscard]] std::uint64_t drops() const noexcept override;
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
-    [[nodiscard]] std::string in_words(bool lockstep) const override;
+    [[nodiscard]] std::string to_text(bool lockstep) const override;
 
     [[nodiscard]] const LidarStats& stats() const noexcept { return stats_; }
     [[nodiscard]] double sweeps() const noexcept {

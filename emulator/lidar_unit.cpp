@@ -11,12 +11,13 @@ namespace {
 /// at constant rates, which is off by acceleration * span^2 / 8: 5e-7 m at 1 m/s^2; a packet of a VLP-16 takes 1.3
 /// ms.
 constexpr std::int64_t kSpan_ns = 2'000'000;
-/// Where velocities are wanted, which are those at the middle of the span: 5e-5 m/s at 1 m/s^2.
+/// The same where velocities are measured: they are those at the middle of the span, which is off by 5e-5 m/s at 1
+/// m/s^2.
 constexpr std::int64_t kVelocitySpan_ns = 100'000;
 
-/// A laser that is off.
-void put_out(std::span<const LidarShot> shots, std::span<LidarEchoes> echoes,
-             std::span<LidarReturn> truth) noexcept {
+/// Clears the echoes and truth of shots whose laser is off.
+void clear_disabled_shots(std::span<const LidarShot> shots, std::span<LidarEchoes> echoes,
+                          std::span<LidarReturn> truth) noexcept {
     for (std::size_t i = 0; i < shots.size(); ++i) {
         if (shots[i].fires) continue;
         echoes[i] = {};
@@ -24,15 +25,15 @@ void put_out(std::span<const LidarShot> shots, std::span<LidarEchoes> echoes,
     }
 }
 
-/// So many of the shots are fired within the span.
+/// Number of the first shots that are fired within the span.
 std::size_t fired_within(std::int64_t span_ns, std::span<const LidarShot> shots) noexcept {
     std::size_t n = 1;
     while (n < shots.size() && shots[n].t_offset_ns - shots[0].t_offset_ns <= span_ns) ++n;
     return n;
 }
 
-/// Of a packet's shots, laser by laser: the next shots of one laser run closer together than those of its
-/// neighbours. Traced like that, a turn of a VLP-16 takes 0.7 of the time.
+/// Order of a packet's shots, laser by laser: successive shots of one laser are closer together, and so more
+/// coherent, than those of neighbouring lasers. In this order, tracing a turn of a VLP-16 takes 0.7 of the time.
 std::vector<std::uint32_t> order_by_laser(std::span<const LidarShot> shots) {
     std::vector<std::uint32_t> order(shots.size());
     std::iota(order.begin(), order.end(), 0u);
@@ -66,7 +67,7 @@ void LidarUnit::fire(std::int64_t packet) noexcept {
     fires_ = std::ranges::any_of(shots_, &LidarShot::fires);
     if (fires_) trace_echoes(packet, start_ns);
     if (fires_ && !truth_.empty()) trace_truth(start_ns);
-    put_out(shots_, echoes_, truth_);
+    clear_disabled_shots(shots_, echoes_, truth_);
     returns_ = 0;
     for (const LidarEchoes& e : echoes_)
         for (const LidarEcho& reported : e.reported(spec().returns)) returns_ += reported.range_m > 0 ? 1 : 0;

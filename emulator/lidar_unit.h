@@ -13,8 +13,8 @@ namespace narpa {
 
 class LidarUnit {
 public:
-    /// `world` must outlive the unit. `truth`: for each shot too, at the cost of a second ray where the beam has
-    /// sub-rays. Allocates here and never again.
+    /// `world` must outlive the unit. `truth`: also computes the truth of each shot, at the cost of a second ray
+    /// where the beam has sub-rays. Allocates here and never again.
     LidarUnit(const World& world, std::size_t index, bool truth = false);
 
     [[nodiscard]] const Lidar& lidar() const noexcept { return lidar_; }
@@ -36,12 +36,12 @@ public:
 
     /// Fires a packet's shots, every body where it is at each shot's own time.
     void fire(std::int64_t packet) noexcept;
-    /// The packet just fired, as it goes out. Empty where none does: all shots fall outside of the unit's window.
+    /// The packet just fired, as it is sent. Empty where all shots fall outside of the unit's window.
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
         return fires_ ? std::span<const std::uint8_t>(bytes_) : std::span<const std::uint8_t>();
     }
     [[nodiscard]] std::size_t returns() const noexcept { return returns_; }
-    /// Of the packet: its shots, and what the unit reports of each, before rounding.
+    /// The shots of the packet, and what the unit reports of each, before rounding.
     [[nodiscard]] std::span<const LidarShot> shots() const noexcept { return shots_; }
     [[nodiscard]] std::span<const LidarEchoes> echoes() const noexcept { return echoes_; }
     /// What the axis of each shot meets: exact ranges, bodies, velocities. Empty without `truth`.
@@ -59,9 +59,9 @@ private:
     /// Calls `work(Span)` for the packet's shots; longer spans have no velocities.
     template <class Work>
     void over_spans(std::int64_t start_ns, std::int64_t span_ns, const Work& work) noexcept;
-    /// Appends a shot, in the LiDAR's axes and its time in nanoseconds after the span's begin.
+    /// Appends a shot in the LiDAR's axes, with its time in nanoseconds after the span's begin.
     void put_beam(std::size_t shot, std::int64_t start_ns, const Span& span, RayBatch& beams) noexcept;
-    /// Takes such beams to the world's axes, and their times to parts of the span.
+    /// Transforms these beams to world axes, and their times to fractions of the span.
     void place(const Span& span, RayBatch& beams) noexcept;
     void trace_echoes(std::int64_t packet, std::int64_t start_ns) noexcept;
     void trace_truth(std::int64_t start_ns) noexcept;
@@ -71,7 +71,7 @@ private:
     const LidarModel& model_;
     LidarReceiver receiver_;
     BodyPoses placement_;
-    std::vector<Motion> motions_;  ///< empty where no velocity is wanted
+    std::vector<Motion> motions_;  ///< empty where neither velocities nor the truth are needed
     std::size_t returns_ = 0;
     bool fires_ = true;
     std::vector<LidarShot> shots_;

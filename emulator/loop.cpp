@@ -20,7 +20,7 @@ constexpr std::int64_t kStartLeadNs = 50'000'000;
 constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a ledger waits for the CAN thread
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
 constexpr std::int64_t kStartingPeriodNs = 500'000'000;  // of heartbeats until a lockstep run begins, wall time
-constexpr int kWaitsAlone = 10;  // of kLockstepWaitNs, for the last commander to come back before the run ends
+constexpr int kCommanderGraceWaits = 10;  // times kLockstepWaitNs: grace period after the last commander has left
 constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
 /// Calls f on the threads on which the sensor works.
@@ -28,7 +28,7 @@ void execute(const Sensor& sensor, TracingThreads& threads, const auto& f) {
     sensor.thread().in_arena ? threads.arena.execute(f) : f();
 }
 
-/// Until the sensor's next item is due. False: the run has ended.
+/// Waits until the sensor's next item is due. False: the run has ended.
 bool wait_for_item(Sensor& sensor, const RealTimeClock& clock, const StopFlag& stop) {
     while (!stop.load(std::memory_order_relaxed)) {
         sensor.plan();
@@ -171,7 +171,7 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             if (can_->bus().ended()) break;
             const bool left = can_->hub() && can_->hub()->commanders_left();
             waits_alone = left ? waits_alone + 1 : 0;
-            if (waits_alone > kWaitsAlone) {
+            if (waits_alone > kCommanderGraceWaits) {
                 notices_.push_back("the last client that sent commands has left the bus: the run has ended");
                 break;
             }

@@ -60,7 +60,7 @@ void OnlineEstimator::process(const FrameLedger& ledger, std::span<const std::ui
     TrackedFrame tracked = tracker_->take(ledger, bytes, at);
     if (keeps_reports_) (void)reports_.push(tracked.report(index_));
     if (log_) log_->append(estimate_row(tracked));
-    if (frames_.size() < kMostKept) frames_.push_back(std::move(tracked));
+    if (frames_.size() < kMaxKept) frames_.push_back(std::move(tracked));
 }
 
 Status OnlineEstimator::finish() {

@@ -35,7 +35,7 @@ public:
     void wake() noexcept;
 
     SpscRing<EstimateReport, 64>& reports() noexcept { return reports_; }
-    /// After the run; the first kMostKept frames.
+    /// After the run; the first kMaxKept frames.
     [[nodiscard]] const std::vector<TrackedFrame>& frames() const noexcept { return frames_; }
     /// Frames that arrived while the estimator was busy.
     [[nodiscard]] std::uint64_t skipped() const noexcept { return skipped_; }
@@ -43,7 +43,7 @@ public:
     [[nodiscard]] const std::string& target() const noexcept { return target_; }
     Status finish();
 
-    static constexpr std::size_t kMostKept = 100'000;
+    static constexpr std::size_t kMaxKept = 100'000;
 
 private:
     enum Slot : int { empty, full };

@@ -96,7 +96,8 @@ TrackedPose PoseTrack::at(std::int64_t t_ns) const noexcept {
     Found found = bracket(t_ns, a, b);
     while (found == Found::torn) found = bracket(t_ns, a, b);
 
-    // Beyond the newest command, or before the oldest one kept: its own motion up to the limit, then at rest.
+    // After the newest command, or before the oldest one kept: extrapolates its motion up to the limit, then holds
+    // still.
     const auto run_on = [&](const Sample& s) {
         const std::int64_t asked = t_ns - s.t_ns, dt = std::clamp(asked, -stale_after_ns_, stale_after_ns_);
         Motion m = extrapolate(s.motion, static_cast<double>(dt) * kSecondsPerNs);

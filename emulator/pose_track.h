@@ -43,7 +43,8 @@ public:
     [[nodiscard]] std::int64_t first_ns() const noexcept { return first_ns_.load(std::memory_order_acquire); }
     [[nodiscard]] std::int64_t newest_ns() const noexcept { return newest_ns_.load(std::memory_order_acquire); }
 
-    /// Commands kept, less one: at 1000 a second those of the last second and another second ahead.
+    /// Size of the ring; kDepth - 1 commands are kept: at 1000 a second, those of the last second and of one second
+    /// ahead.
     static constexpr std::size_t kDepth = 2048;
 
 private:

@@ -1,5 +1,5 @@
-/// emulator/realtime.h - what a real-time run needs from the kernel: locked memory, real-time priority, processors
-/// of its own, and no page faults once it runs.
+/// emulator/realtime.h - what a real-time run needs from the kernel: locked memory, real-time priority, CPU
+/// affinity, and no page faults once it runs.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ Result<std::vector<int>> parse_cpus(const std::string& text);
 /// The name in ps and gdb; at most 15 characters.
 void name_thread(const char* name) noexcept;
 
-/// Of the whole process since its start.
+/// Page faults of the whole process since its start.
 struct PageFaults {
     std::int64_t minor = 0, major = 0;
 };

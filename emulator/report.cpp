@@ -231,7 +231,7 @@ std::string lateness_in_words(const SignedHistogram& late) {
     return text.empty() ? "none" : text;
 }
 
-std::string CameraSensor::in_words(bool lockstep) const {
+std::string CameraSensor::to_text(bool lockstep) const {
     const CameraStats& s = stats_;
     const auto late = [&](double p) { return against_deadline(s.late.percentile_ns(p) * 1e-6); };
     Counts steps;
@@ -241,7 +241,7 @@ std::string CameraSensor::in_words(bool lockstep) const {
                     s.handed_over, s.not_taken > 0 ? fmt::format("{} taken by no sink, ", s.not_taken) : "",
                     s.skipped, lockstep ? "" : fmt::format("{} deadlines missed, ", s.deadline_missed), s.stale);
     out += fmt::format("    p50 / p99 / max: render {}", latency(s.render));
-    if (!lockstep) {  // where no time is the wall's there are no deadlines
+    if (!lockstep) {  // in lockstep there are no deadlines
         out += fmt::format("; mid-exposure to hand-over {}; wake-up latency {}", latency(s.hand_over),
                            latency(s.wake_late));
         out += fmt::format(
@@ -273,7 +273,7 @@ std::string CameraSensor::in_words(bool lockstep) const {
     return out;
 }
 
-std::string LidarSensor::in_words(bool lockstep) const {
+std::string LidarSensor::to_text(bool lockstep) const {
     const LidarStats& s = stats_;
     std::string out = fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
                                   name(), s.packets, sweeps(), s.skipped, s.returns, s.shots);
@@ -301,13 +301,13 @@ double share(std::uint64_t part, std::uint64_t whole) {
     return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
 }
 
-/// What to change where a camera did not keep up; empty: it did.
+/// Advice for a camera that did not keep up; empty: it did.
 std::string advice(const CameraSensor& camera, const Camera& settings, std::int64_t budget_ns) {
     const CameraStats& s = camera.stats();
     const std::uint64_t due = s.frames + s.skipped;
     const double period_ms = static_cast<double>(settings.period_ns) * 1e-6;
     if (share(s.skipped + s.deadline_missed, due) <= kAdvisedShare) return {};
-    const double needs_ms = s.render.percentile_ns(0.99) * 1e-6;  // the detector's share is in it
+    const double needs_ms = s.render.percentile_ns(0.99) * 1e-6;  // includes the detector
     std::string text = fmt::format("camera {}: {} of {} frames were skipped and {} late. ", settings.name,
                                    s.skipped, due, s.deadline_missed);
     if (budget_ns > 0 && static_cast<double>(budget_ns) * 1e-6 < 0.9 * period_ms && s.skipped == 0)
@@ -336,14 +336,14 @@ bool made_nothing(const Emulator& emulator) {
            std::ranges::all_of(lidars, [](const auto* l) { return l->stats().packets == 0; });
 }
 
-/// Whoever stops a run that waits for its first command has not failed. One that others have commanded, but not all
-/// of its bodies, cannot have begun.
+/// Stopping a run that waits for its first command is no failure. A run that was commanded, but not for all of its
+/// bodies, could not begin and has failed.
 bool stopped_while_waiting(const Emulator& emulator) {
     return emulator.stopped() &&
            (emulator.bodies_without_a_pose().empty() || emulator.can()->bus().counters().received == 0);
 }
 
-/// Of a lockstep run that made no item.
+/// Why a lockstep run has made no item.
 std::string why_nothing(const Emulator& emulator) {
     const std::string bodies = emulator.bodies_without_a_pose();
     if (bodies.empty())
@@ -379,14 +379,14 @@ std::vector<std::string> advice(const Emulator& emulator) {
     return all;
 }
 
-std::string in_words(const Emulator& emulator) {
+std::string to_text(const Emulator& emulator) {
     const bool lockstep = emulator.options().lockstep;
     std::string out = fmt::format("{}: {:.3f} s in {}\n", emulator.world().scene().name,
                                   static_cast<double>(emulator.t_ns()) * 1e-9, lockstep ? "lockstep" : "real time");
-    for (const auto& sensor : emulator.sensors()) out += sensor->in_words(lockstep);
+    for (const auto& sensor : emulator.sensors()) out += sensor->to_text(lockstep);
     if (const OnlineEstimator* e = emulator.estimator())
         out += fmt::format("  estimate of {} from camera {}: {} frames skipped; {}", e->target(), e->camera().name,
-                           e->skipped(), in_words(summarise(e->frames())));
+                           e->skipped(), to_text(summarise(e->frames())));
     if (emulator.can()) out += bus_in_words(*emulator.can());
     if (!lockstep)
         out += fmt::format("  page faults while running: {} minor, {} major\n", emulator.page_faults().minor,

@@ -15,12 +15,12 @@ namespace narpa {
 /// part is in the list of its kind ("cameras").
 [[nodiscard]] nlohmann::json report(const Emulator& emulator);
 /// The same as text.
-[[nodiscard]] std::string in_words(const Emulator& emulator);
+[[nodiscard]] std::string to_text(const Emulator& emulator);
 
-/// Named as in JSON.
+/// Percentiles of reports, with their names in JSON.
 inline constexpr std::array<std::pair<const char*, double>, 5> kPercentiles{
     {{"p50", 0.5}, {"p90", 0.9}, {"p99", 0.99}, {"p99.9", 0.999}, {"max", 1.0}}};
-/// By those names, of a Histogram or a SignedHistogram, in parts of `unit`.
+/// Percentiles of a Histogram or SignedHistogram by those names, each times `unit` (1e-6: in ms).
 template <class H>
 [[nodiscard]] nlohmann::json percentiles(const H& histogram, double unit);
 
@@ -30,7 +30,7 @@ template <class H>
 /// For each camera that skipped frames or was late: how much, and which budget or rate to change.
 [[nodiscard]] std::vector<std::string> advice(const Emulator& emulator);
 
-/// How many frames were handed over how long after their deadline (negative: before).
+/// Number of frames by the time from their deadline to the hand-over (negative: before).
 struct LatenessBin {
     double from_ms, to_ms;  ///< infinite at either end
     std::uint64_t frames;
@@ -43,7 +43,7 @@ struct LatenessBin {
 /// "598 1 to 3 ms early, 2 0.3 to 1 ms late": the bins that are not empty.
 [[nodiscard]] std::string lateness_in_words(const SignedHistogram& late);
 
-/// Beside a number of samples per pixel: what it counts.
+/// Note beside a number of samples per pixel: how it is counted.
 inline constexpr const char* kSamplesPerPixelNote = "mean of all pixels; tiles without a body take none";
 
 }  // namespace narpa

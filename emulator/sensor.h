@@ -36,17 +36,18 @@ public:
     /// Where its items go, one text for each sink.
     [[nodiscard]] virtual std::vector<std::string> outputs() const = 0;
 
-    /// Creates its logs in this folder. Before `warm_up`; without it there are none. `wait_when_full`:
-    /// RowLog::create.
+    /// Creates its logs in this folder. Called before `warm_up`; without this call there are no logs.
+    /// `wait_when_full`: RowLog::create.
     virtual Status log_to(const std::string& /*folder*/, bool /*wait_when_full*/) { return Ok{}; }
 
     // The schedule of the next item, simulation time in ns.
 
     /// The first item at or after this time is next.
     virtual void start_at(std::int64_t t_ns) noexcept = 0;
-    /// Takes in what has come for it over CAN, which may change what is next. Before each reading of the schedule.
+    /// Applies what was received for it over CAN, which may change the next item. Called before each reading of the
+    /// schedule.
     virtual void plan() noexcept {}
-    /// In real time the schedule is read again after so long, while the sensor waits.
+    /// In real time, the schedule is read again after this time while the sensor waits.
     [[nodiscard]] virtual std::int64_t schedule_holds_ns() const noexcept { return kSecond_ns; }
     /// The latest pose that the item needs; Clock::kNever where the sensor waits for a trigger. In lockstep, items
     /// are made in this order, once commands reach it; a run that ends at t contains the items with last_pose_ns()
@@ -72,7 +73,7 @@ public:
     /// Statistics of the run, as a JSON object, and the same as lines of text: in lockstep without those that
     /// compare with wall time.
     [[nodiscard]] virtual nlohmann::json report() const = 0;
-    [[nodiscard]] virtual std::string in_words(bool lockstep) const = 0;
+    [[nodiscard]] virtual std::string to_text(bool lockstep) const = 0;
 };
 
 /// Flushes the sinks. Returns the first file that could not be written.

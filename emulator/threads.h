@@ -72,7 +72,7 @@ struct TracingThreads {
             touch_stack();
             if (is_worker && !take_fifo_priority(priority)) refused = true;
         }
-        /// Of this object, from 1: its address may be reused.
+        /// Serial number of this object, from 1, because its address may be reused.
         static inline std::atomic<std::uint64_t> made{0};
         const std::uint64_t number = ++made;
         std::vector<int> cpus;

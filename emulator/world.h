@@ -39,9 +39,9 @@ public:
     /// Other bodies keep the scene's own motion.
     Status load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns);
 
-    /// Computes every body's pose at t. `rider`: the body whose command the source names first (a sensor's
-    /// mount); -1 for none. `motions`: receives the bodies' motions, up to its length; a later call may use
-    /// newer commands. Allocates nothing.
+    /// Computes every body's pose at t. `rider`: the body whose command the returned source names, if it has one (a
+    /// sensor's mount); -1 for none. `motions`: receives the bodies' motions, up to its length; a later call may
+    /// use newer commands. Allocates nothing.
     PlacementSource place(std::int64_t t_ns, int rider, BodyPoses& out,
                           std::span<Motion> motions = {}) const noexcept;
     /// Moves the bodies that can move (all but those at rest without a can_id) from their pose at the start to the

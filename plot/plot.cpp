@@ -26,14 +26,15 @@ namespace {
 /// Exit statuses of narpa-plot, and of a program that could not be started (posix_spawn(3)).
 constexpr int kMatplotlibMissing = 3, kNotStarted = 127;
 
-/// What the environment variable NARPA_PLOT names, or narpa-plot beside the running program, or the one on PATH.
+/// The program that the environment variable NARPA_PLOT names; else narpa-plot beside the running program; else the
+/// one on PATH.
 std::string plot_program() {
     if (const char* named = std::getenv("NARPA_PLOT")) return named;
     return program_beside("narpa-plot");
 }
 
-/// Runs a program at the usual priority, its standard output on our standard error, in a process group of its own:
-/// a request to stop that is sent to ours lets it end its picture. Returns its exit status.
+/// Runs a program with normal priority and its standard output redirected to our standard error. It has a process
+/// group of its own, so that a stop signal to our group lets it finish its picture. Returns its exit status.
 int run_program(std::vector<std::string> arguments) {
     std::vector<char*> argv;
     argv.reserve(arguments.size() + 1);

@@ -19,7 +19,7 @@ namespace narpa {
 /// names another program; NARPA_PLOT=true draws nothing. Starts a process: not for the loop.
 [[nodiscard]] Status write_plot(const std::string& picture, const nlohmann::json& document);
 
-/// An Error where write_plot could not write: for commands that measure for minutes first.
+/// An Error if write_plot could not write there: lets commands that measure for minutes fail early.
 [[nodiscard]] Status can_write_plot(const std::string& picture);
 
 /// A linear value from 0 to 1 as a display's 8 bits (sRGB, IEC 61966-2-1).

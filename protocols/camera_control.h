@@ -1,5 +1,5 @@
-/// protocols/camera_control.h - a camera that is operated while it runs: what it can be told, what it answers, and
-/// what a frame was taken with.
+/// protocols/camera_control.h - a camera that is operated during a run: commands, replies, and the settings of each
+/// frame.
 #pragma once
 
 #include <array>
@@ -29,13 +29,13 @@ struct CameraSettings {
     bool auto_exposure = false;
     std::int64_t exposure_ns = 0;  ///< of one row
     std::int16_t gain_cdb = 0;     ///< over the gain of the scene's detector, 0.01 dB
-    std::uint8_t binning = 1;      ///< n: blocks of n x n pixels have their mean
+    std::uint8_t binning = 1;      ///< n: blocks of n x n pixels are averaged
     Region region{};
     std::int64_t period_ns = 0;  ///< from frame to frame, and the least between triggers
     friend bool operator==(const CameraSettings&, const CameraSettings&) = default;
 };
 
-/// Changes settings together; what is absent stays as it is.
+/// Changes settings together; absent ones stay as they are.
 struct CameraCommand {
     std::uint8_t counter = 0;  ///< +1 with every one; the reply repeats it
     std::uint8_t camera = 0;   ///< index in the scene
@@ -59,7 +59,7 @@ struct CameraTrigger {
     friend bool operator==(const CameraTrigger&, const CameraTrigger&) = default;
 };
 
-/// How a camera answers.
+/// The result of a command or trigger.
 enum class CameraAnswer : std::uint8_t {
     accepted,
     not_controllable,  ///< no such camera, or the scene gives it no `control`
@@ -68,7 +68,7 @@ enum class CameraAnswer : std::uint8_t {
     region_range,   ///< empty, or not within the image
     binning_range,  ///< or not of this pixel format
     period_range,
-    auto_exposure,  ///< an exposure time while the camera sets it
+    auto_exposure,  ///< an exposure time, while auto-exposure is on
     wrong_mode,     ///< a trigger, while the camera is stopped or in another trigger mode
     too_soon,       ///< a trigger before the latency or the exposure before it is over
     overrun,        ///< too many are waiting to take effect
@@ -79,17 +79,17 @@ inline constexpr std::array<std::string_view, 11> kCameraAnswers{
 
 /// One for each camera that a command or a trigger addresses.
 struct CameraReply {
-    std::uint8_t counter = 0;  ///< of what it answers
+    std::uint8_t counter = 0;  ///< of the command or trigger
     std::uint8_t camera = 0;
     bool to_trigger = false;
     CameraAnswer answer = CameraAnswer::accepted;
-    /// Accepted settings: the first frame whose exposure, with them, starts at or after this time has them.
-    /// Accepted trigger: the exposure starts at this time. Refused: when.
+    /// Accepted settings: they apply from the first frame whose exposure, with them, starts at or after this time.
+    /// Accepted trigger: the exposure starts at this time. Refused: when that happened.
     std::int64_t t_ns = 0;
     friend bool operator==(const CameraReply&, const CameraReply&) = default;
 };
 
-/// What a frame was taken with.
+/// The settings of a frame.
 struct CameraState {
     std::uint32_t frame = 0;
     std::uint8_t camera = 0;

@@ -9,7 +9,7 @@
 
 namespace narpa {
 
-/// What the dynamics are doing.
+/// State of the dynamics.
 enum class DynamicsPhase : std::uint8_t {
     flying,
     captured,      ///< contact within the envelope: the docking system holds
@@ -40,7 +40,7 @@ struct DynamicsReport {
     DynamicsPhase phase = DynamicsPhase::flying;
 };
 
-/// What the chaser's star tracker and gyroscope measure.
+/// Measurements of the chaser's star tracker and gyroscope.
 struct AttitudeReport {
     std::uint8_t counter = 0;
     std::int64_t t_ns = 0;
@@ -48,7 +48,7 @@ struct AttitudeReport {
     Vec3 rate_rad_s{};  ///< body axes, against inertial space
 };
 
-/// What the navigation is doing. A powered descent has the phases of Apollo's (F. Bennett, NASA TN D-6846, 1972):
+/// State of the navigation. A powered descent has the phases of Apollo's (F. Bennett, NASA TN D-6846, 1972):
 /// braking to the first target, an approach to each further one, the terminal descent to the ground.
 enum class GuidancePhase : std::uint8_t {
     moving,

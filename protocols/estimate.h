@@ -17,11 +17,11 @@ enum class EstimateState : std::uint8_t {
 };
 inline constexpr std::array<std::string_view, 3> kEstimateStates{"lost", "predicted", "measured"};
 
-/// What a pose is worth that was estimated from one frame or sweep (estimator/pose/answer.h).
+/// Quality of a pose that was estimated from one frame or sweep (estimator/pose/answer.h).
 enum class AnswerKind : std::uint8_t {
-    good,          ///< right within its covariance
+    good,          ///< correct within its covariance
     ambiguous,     ///< another pose explains the measurement nearly as well
-    unobservable,  ///< the measurement does not hold all motions; right in the others
+    unobservable,  ///< the measurement does not constrain all degrees of freedom; correct in the others
     refused,       ///< no pose
 };
 inline constexpr std::array<std::string_view, 4> kAnswerKinds{"good", "ambiguous", "unobservable", "refused"};

@@ -23,7 +23,7 @@ enum class BudgetKind : std::uint8_t {
 };
 inline constexpr std::array<std::string_view, 3> kBudgetKinds{"samples", "rays", "time"};
 
-/// What was handed over in the frame's place: after a deadline missed, the scene's late_policy decides.
+/// What was handed over in place of the frame. After a missed deadline the scene's late_policy decides.
 enum class Delivery : std::uint8_t {
     frame,     ///< itself
     nothing,   ///< drop
@@ -40,7 +40,7 @@ struct FrameLedger {
     static constexpr std::size_t kPasses = 8;
     using Passes = std::array<std::uint32_t, kPasses>;
 
-    std::uint32_t frame = 0;        ///< frame number k; exposure mid = k * period, but of operated cameras
+    std::uint32_t frame = 0;        ///< frame number k; exposure mid = k * period, except for operated cameras
     std::uint8_t camera = 0;        ///< index of the camera in the scene
     std::uint8_t pose_counter = 0;  ///< counter of the newest pose command that the frame used
     bool pose_stale = false;        ///< a commanded body had no command, or one older than stale_after_s
@@ -48,11 +48,11 @@ struct FrameLedger {
     Delivery delivery = Delivery::frame;
     std::uint8_t step = 0;  ///< index into kStepNames
     BudgetKind budget_kind = BudgetKind::samples;
-    std::uint64_t budget = 0;     ///< in the units of its kind
-    std::uint64_t samples = 0;    ///< through the camera
-    std::uint64_t rays = 0;       ///< of all kinds
-    Passes passes{};              ///< camera samples of each pass after the first; by paths in
-                                  ///< sunlight alone, the last are of direct sunlight
+    std::uint64_t budget = 0;   ///< in the units of its kind
+    std::uint64_t samples = 0;  ///< through the camera
+    std::uint64_t rays = 0;     ///< of all kinds
+    Passes passes{};  ///< camera samples of each pass after the first; with paths and only sunlight, the last
+                      ///< passes sample direct sunlight
     float samples_per_pixel = 0;  ///< mean over the image
     float expected_error = -1;    ///< standard error of a pixel, root mean square over the image,
                                   ///< as a fraction of full scale; negative: not estimated
@@ -61,7 +61,7 @@ struct FrameLedger {
     std::int64_t t_render_start_ns = 0, t_render_end_ns = 0;
     std::int64_t t_hand_over_ns = 0;  ///< 0: not handed over, or not yet: the embedded line is written before
     std::int64_t t_deadline_ns = 0;   ///< for the hand-over
-    // What the frame was taken with, beside its exposure: CameraSettings.
+    // Settings of the frame besides its exposure: CameraSettings.
     std::uint8_t command_counter = 0;  ///< of the newest camera command in effect; 0 before the first
     TriggerMode trigger = TriggerMode::free_running;
     std::int16_t gain_cdb = 0;

@@ -12,7 +12,7 @@
 namespace narpa {
 
 struct LedgerField {
-    /// Of FrameLedger. Nothing: derived from other fields.
+    /// Member of FrameLedger. monostate: derived from other fields.
     std::variant<std::monostate, std::uint8_t FrameLedger::*, std::uint32_t FrameLedger::*,
                  std::uint64_t FrameLedger::*, std::int64_t FrameLedger::*, float FrameLedger::*,
                  bool FrameLedger::*, Delivery FrameLedger::*, BudgetKind FrameLedger::*,

@@ -11,8 +11,8 @@ struct LidarBeamReport {
     std::uint8_t lidar = 0;    ///< index of the LiDAR in the scene
     std::uint16_t beam = 0;
     std::int64_t t_ns = 0;  ///< simulation clock: when it fired
-    /// In the instrument's steps, and the velocity along the beam, receding is positive; not a number: no echo, or
-    /// not measured.
+    /// Range and velocity along the beam (receding is positive), in the instrument's steps; NaN: no echo, or not
+    /// measured.
     double range_m = std::numeric_limits<double>::quiet_NaN();
     double velocity_m_s = std::numeric_limits<double>::quiet_NaN();
 };

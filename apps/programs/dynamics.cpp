@@ -25,14 +25,14 @@ Status simulate(Arguments& a) {
     if (!scenario) return scenario.error();
     a.options.seed = a.seed.value_or(scenario->seed);
     stop_on_signals();
-    // Late poses are wrong images. It computes for less than a millisecond at a time.
+    // Late poses give wrong images. Real-time priority does no harm: a step takes less than a millisecond.
     if (!a.options.lockstep) take_fifo_priority(kDynamicsPriority);
     auto bus = join_can_bus(a.bus, a.options.wait_s, stop_flag());
     if (!bus) return bus.error();
     notify_ready(a.ready_fd);
     const auto flown = run_dynamics(*scenario, a.options, **bus, stop_flag());
     if (!flown) return flown.error();
-    cli::print_error("{}\n", in_words(*flown));
+    cli::print_error("{}\n", to_text(*flown));
     return Ok{};
 }
 

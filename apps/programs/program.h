@@ -31,7 +31,7 @@ inline int run_program(int argc, char** argv, const ProgramTexts& texts, int& re
             if (done) done = run();
             return done ? 0 : fail(done.error().text(), exit_status(done.error().kind));
         });
-    } catch (const std::exception& e) {  // out of memory and the like: no code of ours throws
+    } catch (const std::exception& e) {  // such as out of memory: narpa's own code does not throw
         return fail(e.what(), 1);
     }
 }

@@ -32,7 +32,7 @@ struct ReceivedFrame {
     std::int64_t t_received_ns = 0;
 };
 
-/// How a client reaches a bus, for programs.
+/// Addresses through which clients reach a bus, for other programs.
 struct CanAddress {
     std::string bus;  ///< BUS of open_can_bus; empty: the one with which this side opened it
     std::string pty;  ///< pseudo-terminal; empty: none
@@ -65,7 +65,7 @@ protected:
     int wake_fd_ = -1;
 };
 
-/// A reader does its other work after this many frames: a flooded bus always has a next one.
+/// Frames that a reader takes before it does other work; on a flooded bus there is always another frame.
 inline constexpr int kFramesPerTurn = 4096;
 
 /// `hub` is the side of `narpa run`, `client` that of programs that command it (`narpa fly`). They differ where a

@@ -20,7 +20,7 @@ struct Datagram {
     std::uint32_t lost = 0;          ///< datagrams dropped by the kernel so far (SO_RXQ_OVFL); 0: no count
 };
 
-/// What Datagram::lost, which has 32 bits and wraps, has grown by.
+/// Computes increases of Datagram::lost, a 32-bit count that wraps.
 class LossCount {
 public:
     [[nodiscard]] std::uint32_t increase_to(std::uint32_t lost) noexcept {

@@ -1,7 +1,7 @@
 // A USB-CAN adapter with candleLight firmware (gs_usb) as a bus, through libusb: no kernel driver takes part.
 //
-// libusb allocates with every transfer and takes locks, and an adapter is opened again with transfers that wait. So
-// all of it has a thread of its own; between it and the loop are two rings.
+// libusb allocates for every transfer and takes locks, and opening an adapter again blocks. So libusb has a thread
+// of its own; two ring buffers connect it to the loop.
 #include "drivers/can/buses.h"
 #include "drivers/can/usb_adapters.h"
 #include "drivers/can/usb_spec.h"
@@ -24,7 +24,7 @@ namespace {
 
 class UsbCanBus final : public CanBus {
 public:
-    /// `first`: open.
+    /// `first`: an open link.
     UsbCanBus(UsbCanSpec spec, std::unique_ptr<GsUsbShared> shared, std::unique_ptr<GsUsbLink> first)
         : spec_(std::move(spec)), shared_(std::move(shared)) {
         spec_.adapter = first->name();  // the same one when it is plugged in again
@@ -76,7 +76,7 @@ public:
 private:
     static constexpr std::int64_t kPollPeriod_ns = 100'000'000;
 
-    /// What the thread has counted. `sent` are the frames that the bus has or may still get.
+    /// Copies the counts of the thread. `sent`: frames that the bus has taken or may still take.
     void account() noexcept {
         const GsUsbShared& s = *shared_;
         const std::uint64_t lost = s.lost.load(std::memory_order_relaxed);
@@ -100,7 +100,7 @@ private:
                 } else {
                     wait_without_adapter(retry);
                 }
-            } catch (const std::exception&) {  // no memory left: tried again
+            } catch (const std::exception&) {  // out of memory: retried
                 lose();
             }
         }
@@ -129,7 +129,7 @@ private:
 
     UsbCanSpec spec_;
     std::unique_ptr<GsUsbShared> shared_;
-    std::unique_ptr<GsUsbLink> link_;  // the thread's
+    std::unique_ptr<GsUsbLink> link_;  // used by the thread only
     std::uint64_t taken_ = 0, refused_ = 0;
     std::thread thread_;
 };

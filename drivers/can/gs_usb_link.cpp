@@ -13,8 +13,8 @@ namespace narpa {
 namespace {
 
 constexpr std::int64_t kRestart_ns = 100'000'000;  // after bus-off, as `restart-ms 100` of ip-link
-constexpr int kMostErrorsInARow = 64;
-constexpr std::int64_t kEchoPatience_ns = 2 * kSecond_ns;
+constexpr int kMaxErrorsInARow = 64;
+constexpr std::int64_t kEchoTimeout_ns = 2 * kSecond_ns;
 constexpr std::size_t kReceiveBytes = 512;  // a packet of a high-speed endpoint
 
 // As in the table of Linux' gs_usb driver.
@@ -60,7 +60,7 @@ Result<std::unique_ptr<GsUsbLink>> GsUsbLink::open(const UsbCanSpec& spec, GsUsb
 
 GsUsbLink::~GsUsbLink() {
     if (usb_ && !usb_->gone()) (void)put(GsUsbRequest::mode, encode_gs_usb_mode({}), spec_.channel);
-    usb_.reset();  // which still tells of transfers
+    usb_.reset();  // this still reports the end of transfers
     shared_.lost += static_cast<std::uint64_t>(std::ranges::count(places_, true, &Place::unconfirmed));
 }
 
@@ -147,7 +147,7 @@ void GsUsbLink::received(UsbTransfer& transfer, UsbEnd end) noexcept {
             return;
         case UsbEnd::failed:
             ++shared_.malformed;
-            if (++errors_in_a_row_ > kMostErrorsInARow) transfer.link->give_up();
+            if (++errors_in_a_row_ > kMaxErrorsInARow) transfer.link->give_up();
             break;
         case UsbEnd::whole:
         case UsbEnd::partial:
@@ -177,20 +177,20 @@ void GsUsbLink::take_frame(std::span<const std::uint8_t> bytes) noexcept {
     }
 }
 
-/// An echo is the number of a place, and of its generation: adapters send back any 32 bits but kReceived. As long
-/// as none is lost, these are Linux' numbers.
+/// An echo identifier encodes the index and generation of a place: adapters return any 32 bits but kReceived. As
+/// long as no echo is lost, the identifiers are those of the Linux driver.
 void GsUsbLink::confirm(std::uint32_t echo) noexcept {
     const std::uint32_t place = echo % kOuts, generation = echo / kOuts;
     if (generation > places_[place].generation)
         ++shared_.malformed;
     else if (generation == places_[place].generation)
         places_[place].unconfirmed = false;
-    // An echo that was given up: its frame counts as lost already.
+    // Else the echo had timed out, and its frame already counts as lost.
 }
 
-/// The adapter may have lost them: their places are needed.
+/// Frees the places of echoes that the adapter may have lost.
 void GsUsbLink::give_up_old_echoes() noexcept {
-    const std::int64_t t_old_ns = monotonic_ns() - kEchoPatience_ns;
+    const std::int64_t t_old_ns = monotonic_ns() - kEchoTimeout_ns;
     for (std::size_t i = 0; i < kOuts; ++i) {
         Place& p = places_[i];
         if (!p.unconfirmed || usb_->outs()[i].under_way || p.t_sent_ns > t_old_ns) continue;
@@ -220,19 +220,19 @@ void GsUsbLink::sent(UsbTransfer& transfer, UsbEnd end) noexcept {
     if (end == UsbEnd::whole) return;
     Place& place = places_[static_cast<std::size_t>(&transfer - transfer.link->outs().data())];
     if (std::exchange(place.unconfirmed, false)) ++shared_.lost;
-    if (end != UsbEnd::cancelled) transfer.link->give_up();  // the adapter is opened anew
+    if (end != UsbEnd::cancelled) transfer.link->give_up();  // the adapter is opened again
 }
 
-/// The endpoint has stalled: cleared, it goes on.
+/// Clears a stall of the endpoint towards the host and goes on reading.
 void GsUsbLink::recover() noexcept {
     stalled_ = false;
     if (usb_->gone()) return;
-    if (++errors_in_a_row_ > kMostErrorsInARow || !usb_->clear_halt_in()) return usb_->give_up();
+    if (++errors_in_a_row_ > kMaxErrorsInARow || !usb_->clear_halt_in()) return usb_->give_up();
     for (UsbTransfer& in : usb_->ins())
         if (!in.under_way) usb_->receive(in);
 }
 
-/// After bus-off. What was under way on the bus is lost.
+/// Restarts the channel after bus-off. Frames without echo count as lost.
 void GsUsbLink::restart() noexcept {
     restart_ns_ = 0;
     for (std::size_t i = 0; i < kOuts; ++i)

@@ -1,5 +1,5 @@
-/// drivers/can/gs_usb_link.h - one channel of a USB-CAN adapter (gs_usb) from plugging in to pulling out: bit
-/// timing, frames and their echoes, bus-off. Wire: protocols/usb/gs_usb.h.
+/// drivers/can/gs_usb_link.h - one channel of a USB-CAN adapter (gs_usb) from plug-in to unplug: bit timing, frames
+/// and their echoes, bus-off. Wire: protocols/usb/gs_usb.h.
 #pragma once
 
 #include <array>
@@ -30,8 +30,8 @@ struct GsUsbShared {
     std::atomic<std::uint64_t> lost{0};  ///< taken by send(), never confirmed
 };
 
-/// The adapter's clock, which counts microseconds and wraps, against ours: the least delay seen so far is taken for
-/// none, and may grow by 100 ppm for clocks that drift apart.
+/// Converts the adapter's time stamps, microseconds that wrap, to CLOCK_MONOTONIC. The smallest delay seen so far
+/// counts as zero; it may grow by 100 ppm, for clocks that drift apart.
 class GsUsbClock {
 public:
     [[nodiscard]] std::int64_t to_monotonic(std::uint32_t time_us, std::int64_t t_now_ns) noexcept;
@@ -79,10 +79,10 @@ private:
     UsbCanSpec spec_;
     GsUsbShared& shared_;
     std::unique_ptr<UsbLink> usb_;
-    /// Of a transfer: the frame in it whose echo has not come.
+    /// The state of the frame in one outgoing transfer until its echo arrives.
     struct Place {
         bool unconfirmed = false;
-        std::uint32_t generation = 0;  ///< +1 when an echo is given up, so that it is known if it comes late
+        std::uint32_t generation = 0;  ///< +1 when an echo times out, so that a late one is recognised
         std::int64_t t_sent_ns = 0;
     };
     std::array<Place, kOuts> places_{};

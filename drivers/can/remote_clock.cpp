@@ -13,7 +13,7 @@ bool RemoteClock::accept(const ReceivedFrame& received) noexcept {
     const std::int64_t before_ns = newest_.t_ns;
     if (decode(received.frame, before_ns, newest_) != DecodeStatus::complete) return false;
     const bool restarted = synchronized_ && newest_.t_ns < before_ns;
-    // The heartbeat with the least delay is the most accurate, of the run that goes on.
+    // Within one run, the heartbeat with the least delay gives the most accurate offset.
     const std::int64_t offset_ns = newest_.t_ns - received.t_received_ns;
     offset_ns_ = synchronized_ && !restarted ? std::max(offset_ns_, offset_ns) : offset_ns;
     t_received_ns_ = received.t_received_ns;

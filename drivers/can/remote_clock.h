@@ -12,7 +12,7 @@
 
 namespace narpa {
 
-/// In real time the emulator sends ten heartbeats a second: after so long without one it is gone.
+/// In real time the emulator sends ten heartbeats a second; after this long without one it counts as gone.
 inline constexpr double kHeartbeatSilence_s = 10;
 
 /// The simulation clock of `narpa run`, synchronised by its heartbeats. Allocates nothing.
@@ -22,11 +22,11 @@ public:
     bool accept(const ReceivedFrame& received) noexcept;
     /// Reads frames that have arrived, at most kFramesPerTurn, and drops those that are not heartbeats.
     void listen(CanBus& bus) noexcept;
-    /// Without heartbeats: time 0 is now.
+    /// For use without heartbeats: sets time 0 to now.
     void start_here() noexcept;
 
     [[nodiscard]] bool synchronized() const noexcept { return synchronized_; }
-    /// The clock went back at least once: another run of the emulator has begun, and the clock is that one's.
+    /// The clock jumped back at least once: a new run of the emulator has begun, and the clock follows it.
     [[nodiscard]] bool restarted() const noexcept { return restarted_; }
     /// In real time: the emulator's time now. Heartbeats carry whole microseconds.
     [[nodiscard]] std::int64_t now_ns() const noexcept;

@@ -45,19 +45,19 @@ Connection outcome(int fd, std::int64_t timeout_ns) noexcept {
 }
 
 constexpr std::array<std::string_view, 3> kGreeting{"C\r", "S8\r", "O\r"};
-constexpr std::int64_t kAnswerPatience_ns = 5 * kSecond_ns;  // the hub may have heavier things to do
+constexpr std::int64_t kAnswerTimeout_ns = 5 * kSecond_ns;  // the hub may be busy
 
 /// Opens the channel and waits for the hub's answers: from then on no frame of the bus is missed. A hub sends
 /// nothing else before, so what comes after the answers is left in the socket.
 Status greet(int fd) {
     const auto failed = [] {
         const bool hung_up = errno == 0 || errno == EPIPE || errno == ECONNRESET;
-        return Error{hung_up ? "hung up on: it has as many clients as it can have" : std::strerror(errno)};
+        return Error{hung_up ? "connection closed: the hub has reached its limit of clients" : std::strerror(errno)};
     };
     for (const std::string_view line : kGreeting)
         if (::send(fd, line.data(), line.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(line.size()))
             return failed();
-    const std::int64_t until_ns = monotonic_ns() + kAnswerPatience_ns;
+    const std::int64_t until_ns = monotonic_ns() + kAnswerTimeout_ns;
     for (std::size_t answers = 0; answers < kGreeting.size();) {
         std::array<pollfd, 1> fds{{{fd, POLLIN, 0}}};
         wait_ready(fds, std::max<std::int64_t>(until_ns - monotonic_ns(), 0));
@@ -74,7 +74,7 @@ Status greet(int fd) {
 
 class SlcanClient final : public CanBus {
 public:
-    /// The channel is open.
+    /// `fd`: connected, with the channel open.
     SlcanClient(Descriptor fd, std::uint16_t port) : port_(port) { stream_.attach(std::move(fd)); }
     ~SlcanClient() override {
         if (stream_ && stream_.write("C\r")) stream_.flush();
@@ -90,7 +90,7 @@ public:
                     ++counters_.received;
                     return true;
                 }
-                // The hub's answers to what we sent: z and Z; the rest are lines that no hub sends unasked.
+                // z and Z acknowledge our frames; no hub sends any other line unasked.
                 if (line != "z" && line != "Z") ++counters_.malformed;
             }
             count_overlong();
@@ -129,7 +129,7 @@ public:
     }
 
 private:
-    /// Connected again; does not wait for answers.
+    /// Opens the channel of a new connection; does not wait for the answers.
     void begin(Descriptor fd) noexcept {
         stream_.attach(std::move(fd));
         for (const std::string_view line : kGreeting)

@@ -25,8 +25,8 @@ constexpr std::size_t kTcpClients = 8, kPty = kTcpClients, kClients = kTcpClient
 struct Client {
     SlcanStream stream{};
     bool open = false;             ///< it has sent O: it is on the bus
-    std::uint64_t connection = 0;  ///< counts all clients that have come
-    bool commands = false;         ///< a command came on this connection
+    std::uint64_t connection = 0;  ///< serial number of the connection
+    bool commands = false;         ///< it has sent a command
     std::uint64_t overlong = 0;
     std::int64_t t_full_ns = 0;  ///< since when its send queue has been too full for others' frames; 0: it keeps up
 };
@@ -58,7 +58,7 @@ constexpr std::size_t kRoomForRead = kFramesPerRead * kSlcanMaxLine;
 /// The kernel's send buffer for a client: the larger it is, the later POLLOUT reports room again.
 constexpr int kSocketBytes = 128 << 10;
 /// How long all clients wait for one that does not read. After that it misses frames.
-constexpr std::int64_t kPatience_ns = 1000'000'000;
+constexpr std::int64_t kTimeout_ns = 1000'000'000;
 
 class SlcanHub final : public CanBus, public ClientHub {
 public:
@@ -116,8 +116,8 @@ public:
             held_up = held_up || !may_send;
             fds[i] = {s.fd(), static_cast<short>((may_send ? POLLIN : 0) | (s.pending() ? POLLOUT : 0)), 0};
         }
-        const bool patience_ends_first = held_up && (timeout_ns < 0 || timeout_ns > kPatience_ns);
-        wait_ready(fds, patience_ends_first ? kPatience_ns : timeout_ns);
+        const bool patience_ends_first = held_up && (timeout_ns < 0 || timeout_ns > kTimeout_ns);
+        wait_ready(fds, patience_ends_first ? kTimeout_ns : timeout_ns);
     }
 
     [[nodiscard]] bool carries_fd() const noexcept override { return false; }
@@ -154,7 +154,7 @@ private:
             return true;
         }
         if (client.t_full_ns == 0) client.t_full_ns = monotonic_ns();
-        return monotonic_ns() - client.t_full_ns > kPatience_ns;
+        return monotonic_ns() - client.t_full_ns > kTimeout_ns;
     }
 
     void accept_clients() noexcept {

@@ -23,7 +23,7 @@ struct Interface {
     bool up = false, carries_fd = false;
     int send_queue = 0;  ///< frames; 0: there is none (virtual interfaces)
 };
-/// More than what is sent at once: of two cameras ledgers (10 classic frames each), states (6) and estimates (10).
+/// More frames than one burst: ledgers (10 classic frames each), states (6) and estimates (10) of two cameras.
 constexpr int kBurst = 64;
 
 /// The interface as it is now; index 0 with errno when there is none of that name.

@@ -10,15 +10,14 @@
 namespace narpa {
 
 struct UsbCanSpec {
-    std::string
-        adapter{};  ///< serial number, or the place of the plug as Linux writes it (1-4.2); empty: the only one
+    std::string adapter{};  ///< serial number, or the port path as in Linux (1-4.2); empty: the only one
     std::uint8_t channel = 0;
     std::uint32_t bit_rate = 1'000'000;
     std::uint32_t data_bit_rate = 4'000'000;  ///< of CAN FD's data phase
     friend bool operator==(const UsbCanSpec&, const UsbCanSpec&) = default;
 };
 
-/// What follows `usb:`, [ADAPTER][/CHANNEL][@BIT_RATE[,DATA_BIT_RATE]].
+/// Parses the text after `usb:`, [ADAPTER][/CHANNEL][@BIT_RATE[,DATA_BIT_RATE]].
 Result<UsbCanSpec> parse_usb_can(std::string_view text);
 
 }  // namespace narpa

@@ -51,7 +51,7 @@ HttpRequestReader::State HttpRequestReader::take(std::string_view bytes) {
     if (has_head_) {
         request_.body += bytes.substr(0, body_bytes_ - request_.body.size());
     } else {
-        // The end of the head may begin in what came before.
+        // The empty line that ends the head may be split between two reads.
         const std::size_t from = text_.size() < 3 ? 0 : text_.size() - 3;
         text_ += bytes.substr(0, kHeadBytesMost + kBodyBytesMost);
         const std::size_t end = text_.find("\r\n\r\n", from);

@@ -15,7 +15,7 @@ struct HttpRequest {
     std::string client{};  ///< the sender's IPv4 address, "192.0.2.7"
 };
 
-/// %xx and + of a query. Nothing sensible in place of a bad %xx: it stays as it is.
+/// Decodes %xx and + in a query. A malformed %xx stays as it is.
 [[nodiscard]] std::string decode_query(std::string_view text);
 
 /// Collects the bytes of one request. Memory is bounded: kHeadBytesMost and kBodyBytesMost.
@@ -28,10 +28,10 @@ public:
     /// Takes the next bytes; those after a whole request are dropped.
     State take(std::string_view bytes);
     [[nodiscard]] const HttpRequest& request() const noexcept { return request_; }
-    /// Of a refused request: the status code of HTTP, and a sentence for its sender.
+    /// HTTP status code of a refused request, and a sentence for its sender.
     [[nodiscard]] int status() const noexcept { return status_; }
     [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
-    /// The head is there, the body is not, and the client waits for "100 Continue" before it sends it. True once.
+    /// True, once, when the head has arrived and the client waits for "100 Continue" before it sends the body.
     [[nodiscard]] bool wants_continue() noexcept;
 
 private:

@@ -60,7 +60,7 @@ public:
     }
     [[nodiscard]] std::int64_t until_ns() const noexcept { return until_ns_; }
 
-    /// False: it is over.
+    /// False: the connection has ended.
     bool proceed(short ready, const HttpHandler& handler) {
         if (monotonic_ns() >= until_ns_) {
             if (!answered_) {
@@ -157,7 +157,7 @@ void HttpServer::run() noexcept {
                 if (!connections_[i].proceed(fds[2 + i].revents, handler_))
                     connections_.erase(connections_.begin() + static_cast<std::ptrdiff_t>(i));
             if (fds[1].revents != 0) accept_one();
-        } catch (const std::exception&) {  // no memory left: clients try again
+        } catch (const std::exception&) {  // out of memory: clients try again
             connections_.clear();
         }
     }
@@ -168,7 +168,7 @@ void HttpServer::accept_one() {
     socklen_t size = sizeof from;
     Descriptor fd(
         ::accept4(listening_.get(), reinterpret_cast<sockaddr*>(&from), &size, SOCK_CLOEXEC | SOCK_NONBLOCK));
-    if (!fd) {  // no descriptor left: not at once again
+    if (!fd) {  // no descriptor left: pause before the next accept
         if (errno == EMFILE || errno == ENFILE) wait_ready(std::span<pollfd>(), kExchange_ns / 50);
         return;
     }

@@ -16,7 +16,7 @@ using nlohmann::json;
 
 constexpr std::string_view kMetadata = "/api/v1/sensor/metadata", kConfig = "/api/v1/sensor/config",
                            kCommand = "/api/v1/sensor/cmd/", kFirmware = "/api/v1/system/firmware";
-/// The answers of firmware 2.4: some are checked by drivers to the letter.
+/// Answers of firmware 2.4: drivers compare some of them verbatim.
 const json kDone = json::object(), kWasSet = "set_config_param";
 
 HttpResponse ok(const json& document) {
@@ -50,7 +50,7 @@ bool is_ipv4(const std::string& text) {
     return ::inet_pton(AF_INET, text.c_str(), &ignored) == 1;
 }
 
-/// A value as the text of a request has it: JSON where it is that, else the text itself.
+/// The value in the text of a request: parsed as JSON if it is JSON, else the text itself.
 json value_of(const std::string& text) {
     json value = json::parse(text, nullptr, false);
     return value.is_discarded() ? json(text) : value;
@@ -93,7 +93,7 @@ std::optional<std::string> set_all(json& config, const json& values, const std::
 
 struct OusterApi::State {
     json metadata;
-    json staged;  ///< configuration until the sensor starts anew
+    json staged;  ///< configuration that takes effect when the sensor restarts
     [[nodiscard]] json& active() { return metadata.at("config_params"); }
 };
 
@@ -147,7 +147,7 @@ HttpResponse OusterApi::command(const std::string& name, const HttpRequest& requ
         if (name == "reinitialize") state_->active() = state_->staged;
         return ok(kDone);
     }
-    // As firmware before 2.4 names the parts of the metadata.
+    // Firmware before 2.4 has one command for each part of the metadata.
     if (name.starts_with(get) && state_->metadata.contains(name.substr(get.size())))
         return ok(state_->metadata[name.substr(get.size())]);
     return refused(404, "no such command: " + name);

@@ -1,10 +1,10 @@
-/// drivers/lidar/ouster_api.h - the HTTP API by which drivers ask and configure an Ouster sensor, without the
-/// network.
+/// drivers/lidar/ouster_api.h - the HTTP API through which drivers query and configure an Ouster sensor: requests
+/// to responses, without the network.
 ///
-/// What a driver does at start: it reads the firmware's version and the active configuration, sets where packets
-/// go, has the sensor start anew, and reads the metadata. Requests that would change what the scene decides on
-/// (mode, profile, window) are refused with a sentence. Source: Ouster, Firmware User Manual, "HTTP API Reference";
-/// protocols/lidar/README.md lists the requests.
+/// At start a driver reads the firmware's version and the active configuration, sets where packets go, restarts the
+/// sensor, and reads the metadata. Requests that would change settings of the scene (mode, profile, window) are
+/// refused with a reason. Source: Ouster, Firmware User Manual, "HTTP API Reference"; protocols/lidar/README.md
+/// lists the requests.
 #pragma once
 
 #include <cstdint>
@@ -27,13 +27,13 @@ struct OusterDestination {
 /// Used by one thread at a time.
 class OusterApi {
 public:
-    /// `metadata`: LidarModel::metadata(). Error: not those of such a sensor.
+    /// `metadata`: LidarModel::metadata(). Error: not the metadata of an Ouster sensor.
     static Result<OusterApi> create(const std::string& metadata);
     OusterApi(OusterApi&&) noexcept;
     ~OusterApi();
 
     [[nodiscard]] HttpResponse answer(const HttpRequest& request);
-    /// As the active configuration has it.
+    /// The destination in the active configuration.
     [[nodiscard]] OusterDestination destination() const;
 
 private:

@@ -1,5 +1,5 @@
-// The sink `ouster:[ADDRESS:]PORT`: an Ouster sensor's HTTP server, and its packets to where a driver asks for
-// them.
+// The sink `ouster:[ADDRESS:]PORT`: the HTTP server of an Ouster sensor, and its packets to the destination that a
+// driver sets.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -81,7 +81,7 @@ private:
     SharedDestination destination_;
     std::string description_;
     std::atomic<std::uint64_t> sent_{0}, dropped_{0};
-    std::unique_ptr<HttpServer> server_;  ///< last: its thread ends before what it uses
+    std::unique_ptr<HttpServer> server_;  ///< declared last, so that its thread ends before what it uses
 };
 
 }  // namespace

@@ -15,12 +15,12 @@ namespace narpa {
 struct PacketCounters {
     std::uint64_t sent = 0;
     std::uint64_t dropped = 0;  ///< socket buffer full, no receiver, disk full
-    /// Of those sent by UDP: lost at a receiver on this machine, whose socket's buffer was full.
+    /// Of the packets sent by UDP: lost at a receiver on this machine, whose socket buffer was full.
     std::uint64_t receiver_dropped = 0;
 };
 
 /// Each kind has its own port (LidarNetwork). `udp:HOST:PORT` sets the data port; position packets keep their
-/// distance.
+/// offset from it.
 enum class PacketKind : std::uint8_t { data, position };
 
 class PacketSink {
@@ -43,9 +43,10 @@ public:
 /// SINK: `udp:HOST[%INTERFACE]:PORT[,ttl=N]` (one receiver, a broadcast or a multicast address: udp_route.h) |
 /// `FILE.pcap` | `ouster:[ADDRESS:]PORT` | `none`. A capture shows the packets as `network` sends them by default;
 /// `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps. `wait_when_full`: a lockstep run waits for
-/// the disk where a real-time run drops. `metadata`: LidarModel::metadata(); where there are some, FILE.json beside
-/// a capture gets them. `ouster:` is a sensor on the network: an HTTP server at ADDRESS (127.0.0.1) states the
-/// metadata and takes where the packets go to; before that they go nowhere and are not counted.
+/// the disk where a real-time run drops. `metadata`: LidarModel::metadata(); if not empty, it is written to
+/// FILE.json beside a capture. `ouster:` emulates a sensor on the network: an HTTP server at ADDRESS (default
+/// 127.0.0.1) serves the metadata and accepts the packets' destination; until then packets are discarded and not
+/// counted.
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
                                                      std::int64_t epoch_unix_ns, bool wait_when_full,
                                                      std::string_view metadata = {});

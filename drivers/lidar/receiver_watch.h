@@ -1,7 +1,7 @@
 /// drivers/lidar/receiver_watch.h - datagrams that receivers on this machine lose because their socket's buffer is
 /// full.
 ///
-/// The kernel drops such a datagram without a word to the sender and counts it at the receiving socket, in
+/// The kernel drops such a datagram without notice to the sender and counts it at the receiving socket, in
 /// /proc/net/udp and /proc/net/udp6. A thread of normal priority reads the counts twice a second.
 #pragma once
 
@@ -20,7 +20,7 @@ namespace narpa {
 
 class ReceiverWatch {
 public:
-    /// Of sockets bound to one of these ports, at this address or at all; 0: no port.
+    /// Watches sockets bound to one of these ports (0: none), at this address or at the wildcard address.
     ReceiverWatch(const sockaddr_storage& to, std::array<int, 2> ports);
     ~ReceiverWatch();
     ReceiverWatch(const ReceiverWatch&) = delete;
@@ -32,7 +32,7 @@ public:
     [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
 private:
-    /// Ports are shared by few sockets (SO_REUSEPORT, multicast); those beyond are not counted.
+    /// Few sockets share a port (SO_REUSEPORT, multicast); sockets beyond this number are not counted.
     static constexpr std::size_t kSocketsMost = 4096;
 
     struct Socket {
@@ -46,7 +46,7 @@ private:
     in6_addr to_{};  ///< IPv4 addresses mapped into IPv6
     std::array<int, 2> ports_;
     std::vector<Socket> sockets_;  ///< those known; room for kSocketsMost is taken at the start
-    bool first_ = true;            ///< what the kernel has counted so far are others' datagrams
+    bool first_ = true;            ///< the first reading is the baseline: its counts are of earlier datagrams
     std::mutex reading_;
     std::atomic<std::uint64_t> dropped_{0};
     int end_fd_ = -1;

@@ -140,7 +140,7 @@ Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) 
     if (address->host.empty() || address->ttl >= 0 || !udp_port(port))
         return Error{name + ": expected udp:PORT or udp:ADDRESS:PORT with a port from 1 to 65535, as in udp:2368"};
 
-    // An IPv6 address within its link is one with its interface only.
+    // A link-local IPv6 address is complete only with its interface.
     const bool ipv6 = address->host.find(':') != std::string::npos;
     const std::string node = address->host + (ipv6 && !address->interface.empty() ? "%" + address->interface : "");
     addrinfo hints{}, *found = nullptr;

@@ -27,7 +27,7 @@ Error missing(const std::string& what, const std::string& remedy) {
     return {.what = what, .kind = ErrorKind::missing, .remedy = remedy};
 }
 
-/// Of the interface; 0: none is named.
+/// Index of the interface; 0: none is named.
 Result<unsigned> interface_index(const UdpAddress& address, const std::string& what) {
     if (address.interface.empty()) return 0u;
     const unsigned index = ::if_nametoindex(address.interface.c_str());
@@ -60,7 +60,7 @@ bool set_ttl(int fd, const UdpDestination& to, int ttl) {
     return set(fd, IPPROTO_IP, to.is_multicast() ? IP_MULTICAST_TTL : IP_TTL, ttl);
 }
 
-/// Of a socket that is set: nothing is sent.
+/// True if the kernel has a route. Connecting a UDP socket sends nothing.
 bool has_route(const UdpDestination& to) {
     const Descriptor fd(::socket(to.address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     UdpDestination with_port = to;

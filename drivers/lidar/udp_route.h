@@ -2,8 +2,8 @@
 /// live.
 ///
 /// Text: HOST[%INTERFACE]:PORT[,ttl=N], an IPv6 host in brackets (RFC 4007 writes the interface in the same way).
-/// Broadcast and multicast addresses name many receivers and no way to them: the system sends them where its table
-/// of routes says, which often has none; an interface decides.
+/// Broadcast and multicast addresses need an entry in the routing table, which often has none, or a named
+/// interface.
 #pragma once
 
 #include <sys/socket.h>
@@ -15,12 +15,12 @@
 
 namespace narpa {
 
-/// A text in its parts; they may be empty.
+/// The parts of an address text; they may be empty.
 struct UdpAddress {
     std::string host, interface, port;
     int ttl = -1;  ///< 0 to 255; -1: the system's, 1 for multicast
 
-    /// An Error names what is wrong with the options; hosts and ports are not looked at.
+    /// Errors concern the options; host and port are not checked.
     static Result<UdpAddress> parse(std::string_view text);
 };
 
@@ -29,8 +29,8 @@ struct UdpDestination {
     sockaddr_storage address{};
     socklen_t size = 0;
 
-    /// Looks the host up. Of a name with addresses of both families it is an IPv4 one: most drivers of LiDARs
-    /// listen there alone. `what` begins its Errors.
+    /// Resolves the host. A name with addresses of both families gives an IPv4 one, because most LiDAR drivers
+    /// listen only there. `what`: start of the error texts.
     static Result<UdpDestination> resolve(const std::string& host, const std::string& what);
     /// "192.168.1.70", without interface and port.
     [[nodiscard]] std::string text() const;
@@ -38,9 +38,9 @@ struct UdpDestination {
     [[nodiscard]] bool is_multicast() const noexcept;
 };
 
-/// Sets a socket of the destination's family for it: broadcasts are allowed, as by the instrument. Errors: there is
-/// no such interface, and no route to a multicast or to the limited broadcast address, 255.255.255.255, where the
-/// interface is not named.
+/// Sets interface and time to live of a socket of the destination's family, and allows broadcasts, which the
+/// instrument sends too. Errors: no such interface; no interface named and no route to a multicast address or to
+/// the limited broadcast address, 255.255.255.255.
 [[nodiscard]] Status set_route(int fd, UdpDestination& to, const UdpAddress& address, const std::string& what);
 
 /// Makes a bound socket a receiver of a multicast group; does nothing for other addresses.

@@ -40,7 +40,7 @@ void BridgeDevice::plugged(bool /*in*/) noexcept {
 int BridgeDevice::control(const UsbSetup& setup, std::span<std::uint8_t> /*data*/) noexcept {
     if (setup.kind() != 0) return UsbAnswer::kStall;
     const std::lock_guard lock(mutex_);
-    if (setup.request == UsbRequest::kClearFeature) drop_partial();  // the host begins anew
+    if (setup.request == UsbRequest::kClearFeature) drop_partial();  // the host restarts the stream
     return 0;
 }
 
@@ -61,7 +61,7 @@ int BridgeDevice::give(int /*endpoint*/, std::span<std::uint8_t> /*room*/) noexc
     return UsbAnswer::kStall;
 }
 
-/// A short packet has come.
+/// Checks the frame that a short packet has ended, and releases its slot to the reader.
 void BridgeDevice::conclude() noexcept {
     Slot& slot = slots_[(first_ + ready_) % kFrames];
     const auto bytes = std::span<const std::uint8_t>(slot.bytes);

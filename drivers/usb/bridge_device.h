@@ -1,5 +1,5 @@
-/// drivers/usb/bridge_device.h - a frame bridge in software: what an FPGA or an FX3 behind a bulk endpoint does
-/// with the frames of `--video CAMERA=bulk:`. Wire: protocols/video/bulk_frame.h.
+/// drivers/usb/bridge_device.h - a frame bridge in software, in place of an FPGA or an FX3 behind a bulk endpoint:
+/// receives the frames of `--video CAMERA=bulk:`. Wire: protocols/video/bulk_frame.h.
 #pragma once
 
 #include <array>
@@ -56,7 +56,7 @@ private:
     std::condition_variable arrived_;
     std::array<Slot, kFrames> slots_;
     std::size_t first_ = 0, ready_ = 0;  ///< slots with whole frames; the one behind them is being filled
-    std::size_t filled_ = 0;             ///< bytes that came for it, also those beyond its end
+    std::size_t filled_ = 0;             ///< bytes received for it, also those beyond its end
     bool has_number_ = false;
     std::uint32_t number_ = 0;
     VideoSourceCounters counters_;

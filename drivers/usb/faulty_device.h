@@ -1,5 +1,5 @@
-/// drivers/usb/faulty_device.h - another USB device that, after a number of its transfers, behaves badly, or says
-/// of itself what cannot be: to try how hosts take it.
+/// drivers/usb/faulty_device.h - wraps a USB device and injects faults after a number of transfers, or gives it
+/// invalid descriptors, to test how hosts handle them.
 #pragma once
 
 #include <cstdint>
@@ -15,27 +15,28 @@ enum class UsbFault : std::uint8_t {
     shorten,      ///< every tenth transfer towards the host ends early
     babble,       ///< every tenth transfer towards the host has too many bytes
     hang,         ///< no transfer of a bulk endpoint is ever answered again
-    answers,      ///< every answer to a vendor's control request ends in its middle
+    answers,      ///< every answer to a vendor's control request is cut to half its length
     stall_out,    ///< every tenth transfer from the host stalls, and all that follow until the host clears the halt
     shorten_out,  ///< of every tenth transfer from the host only half is taken
-    descriptors,  ///< the configuration descriptor is the `after`th of wrong_configuration
+    descriptors,  ///< the configuration descriptor is wrong_configuration of kind `after`
 };
 
-/// A configuration of one interface with two bulk endpoints, spoilt in a way of its own for each `kind` from 1 to
-/// kWrongConfigurations.
+/// Corrupts a configuration of one interface with two bulk endpoints; each `kind` from 1 to kWrongConfigurations
+/// corrupts it in its own way.
 inline constexpr std::uint64_t kWrongConfigurations = 10;
 [[nodiscard]] std::vector<std::uint8_t> wrong_configuration(std::vector<std::uint8_t> good, std::uint64_t kind);
 
 class FaultyDevice final : public UsbDevice {
 public:
-    /// `device` must outlive it. `after`: transfers of bulk endpoints that are as they should be; for `answers`,
-    /// requests.
+    /// `device` must outlive it. `after`: number of good bulk transfers before the fault begins; for `answers`, of
+    /// vendor requests; for `descriptors`, the kind.
     FaultyDevice(UsbDevice& device, UsbFault fault, std::uint64_t after)
         : device_(device), fault_(fault), after_(after), wrong_(device.descriptors()) {
         if (fault == UsbFault::descriptors) wrong_.configuration = wrong_configuration(wrong_.configuration, after);
     }
 
-    /// Wrong ones only from plugging in on: the server takes none that cannot be decoded.
+    /// Wrong ones only while plugged in, because the server refuses to start with descriptors that it cannot
+    /// decode.
     [[nodiscard]] const UsbDescriptors& descriptors() const noexcept override {
         return plugged_ ? wrong_ : device_.descriptors();
     }
@@ -86,7 +87,7 @@ private:
     UsbDevice& device_;
     UsbFault fault_;
     std::uint64_t after_, transfers_ = 0, requests_ = 0;
-    UsbDescriptors wrong_;  ///< right where the fault is another
+    UsbDescriptors wrong_;  ///< unchanged for other faults
     bool plugged_ = false, halted_ = false;
 };
 

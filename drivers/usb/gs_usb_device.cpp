@@ -16,7 +16,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::int64_t kRetry_ns = 1'000'000;  // of a frame that the bus does not take
+constexpr std::int64_t kRetry_ns = 1'000'000;  // interval between tries to send a frame that the bus does not take
 constexpr BitTimingRange kDataRange{1, 32, 1, 16, 16, 1, 32, 1};
 
 UsbDescriptors adapter_descriptors(std::string serial) {
@@ -212,7 +212,7 @@ bool GsUsbDevice::to_bus(CanBus& bus) noexcept {
     return any;
 }
 
-/// What the bus behind says of itself: the same to the host.
+/// Reports bus-off and error frames of the bus to the host. True: a report was queued.
 bool GsUsbDevice::mirror_errors(const CanBus& bus) noexcept {
     const CanCounters& c = bus.counters();
     const bool was_bus_off = std::exchange(bus_off_seen_, c.bus_off) != c.bus_off;

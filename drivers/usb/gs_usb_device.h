@@ -47,12 +47,13 @@ public:
     [[nodiscard]] int give(int endpoint, std::span<std::uint8_t> room) noexcept override;
 
     // --- From the CAN thread ---
-    /// Serves the bus once: waits at most timeout_ns, then carries frames both ways. True: UsbIpServer::wake is
-    /// due.
+    /// Serves the bus once: waits at most timeout_ns, then carries frames both ways. True: the caller is to call
+    /// UsbIpServer::wake.
     bool turn(CanBus& bus, std::int64_t timeout_ns) noexcept;
-    /// The controller goes bus-off after so many more frames of the host; the host has to start the channel again.
+    /// The controller goes bus-off after this many more frames of the host; the host has to start the channel
+    /// again.
     void bus_off_after(std::uint64_t frames) noexcept { bus_off_after_ = frames; }
-    /// After so many frames of the host, every second one has no echo.
+    /// After this many frames of the host, every second one has no echo.
     void lose_echoes_after(std::uint64_t frames) noexcept { lose_echoes_after_ = frames; }
 
     /// From any thread.
@@ -79,7 +80,7 @@ private:
     UsbDescriptors descriptors_;
     GsUsbLimits limits_;
     int wake_fd_ = -1;
-    /// Counts resets: what is in the rings from before the last one is dropped by whoever reads it.
+    /// Counts resets: entries of the rings from an earlier session are dropped when they are read.
     std::atomic<std::uint32_t> session_{0};
     std::atomic<bool> started_{false}, with_time_{false}, overflowed_{false}, is_bus_off_{false};
     SpscRing<Entry, kToHost> to_host_;

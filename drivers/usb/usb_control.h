@@ -8,7 +8,8 @@
 
 namespace narpa {
 
-/// Answers those from the device's descriptors, and hands the others to UsbDevice::control, as which it returns.
+/// Answers these requests from the device's descriptors and passes the others to UsbDevice::control. Returns what
+/// UsbDevice::control returns.
 [[nodiscard]] int usb_control(UsbDevice& device, const UsbSetup& setup, std::span<std::uint8_t> data) noexcept;
 
 }  // namespace narpa

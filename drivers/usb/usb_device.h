@@ -18,7 +18,7 @@ struct UsbDescriptors {
     std::vector<std::string> strings{};         ///< string 1 is the first
 };
 
-/// How a transfer ends, where it does not with a number of bytes; numbered as Linux numbers errors.
+/// Results of a transfer other than a number of bytes: negative Linux error numbers.
 struct UsbAnswer {
     static constexpr int kStall = -32;     ///< EPIPE
     static constexpr int kBabble = -75;    ///< EOVERFLOW: more than the host asked for
@@ -33,8 +33,8 @@ public:
     [[nodiscard]] virtual const UsbDescriptors& descriptors() const noexcept = 0;
     /// A host has taken the device (the cable is in) or let it go. Before the first call it is out.
     virtual void plugged(bool in) noexcept = 0;
-    /// A request of a class or of the vendor, and of the standard ones SET_INTERFACE and CLEAR_FEATURE of an
-    /// endpoint. From the host, `data` is what came; towards it, what is to be filled in, as long as asked for.
+    /// Handles requests of a class or vendor, and the standard requests SET_INTERFACE and CLEAR_FEATURE of an
+    /// endpoint. `data`: the received bytes, or towards the host the room for as many bytes as it asked for.
     /// Returns the number of bytes, or UsbAnswer::kStall.
     [[nodiscard]] virtual int control(const UsbSetup& setup, std::span<std::uint8_t> data) noexcept = 0;
     /// A transfer from the host. `endpoint`: its number. Returns the number of bytes taken, or a UsbAnswer.

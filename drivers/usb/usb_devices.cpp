@@ -11,7 +11,7 @@
 namespace narpa {
 namespace {
 
-/// A device that is plugged in, open where it may be.
+/// A device that is plugged in, opened if permitted.
 struct FoundUsbDevice {
     PluggedUsbDevice what;
     int code = 0;  // of libusb_open
@@ -24,7 +24,7 @@ Result<LibusbOwned<libusb_context>> usb_context() {
     return LibusbOwned<libusb_context>(context);
 }
 
-/// Bus and ports, as Linux names the place of a plug.
+/// Port path, as in Linux: bus number and port numbers.
 std::string place_of(libusb_device* device) {
     std::array<std::uint8_t, 8> ports{};
     const int n = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
@@ -70,7 +70,7 @@ std::string names_of(const UsbKind& kind, const std::vector<FoundUsbDevice>& dev
     return text;
 }
 
-/// The one that is meant, open.
+/// The device that `wanted` names, open.
 Result<FoundUsbDevice> choose(const UsbKind& kind, std::vector<FoundUsbDevice> devices, std::string_view wanted) {
     const std::string a_kind(kind.name);
     if (devices.empty())

@@ -30,17 +30,17 @@ struct UsbKind {
 };
 
 struct PluggedUsbDevice {
-    std::string place;      ///< of the plug, as Linux writes it: 1-4.2
+    std::string place;      ///< port path, as in Linux: 1-4.2
     std::string serial{};   ///< empty: none, or it cannot be read without a permission
     std::string trouble{};  ///< why it cannot be opened; empty: it can
     [[nodiscard]] const std::string& name() const noexcept { return serial.empty() ? place : serial; }
 };
 
-/// What permits users to open them.
+/// Text: how to permit users to open the devices.
 [[nodiscard]] std::string usb_permission_remedy();
-/// Whether it can be a serial number or a place: letters that can be copied from a terminal; or empty.
+/// True for texts that can be a serial number or a port path (printable ASCII), and for an empty one.
 [[nodiscard]] bool is_usb_name(std::string_view text) noexcept;
-/// Of a program without libusb.
+/// The Error of a program that was built without libusb.
 [[nodiscard]] Error built_without_usb();
 
 struct LibusbRelease {
@@ -60,9 +60,9 @@ struct OpenUsbDevice {
 
 /// Error: a machine without USB.
 Result<std::vector<PluggedUsbDevice>> list_usb_devices(std::span<const UsbId> ids);
-/// `wanted`: a serial number or a place; empty: the only one. Errors name those that are plugged in.
+/// `wanted`: a serial number or a port path; empty: the only one. Errors name those that are plugged in.
 Result<OpenUsbDevice> open_usb_device(const UsbKind& kind, std::string_view wanted);
-/// `code`: of libusb.
+/// `code`: error code of libusb.
 [[nodiscard]] Error usb_error(const std::string& what, int code);
 
 }  // namespace narpa

@@ -13,7 +13,7 @@ namespace narpa {
 namespace {
 
 constexpr unsigned kControlPatience_ms = 1000;
-constexpr std::int64_t kFarewell_ns = 2 * kSecond_ns;
+constexpr std::int64_t kCloseTimeout_ns = 2 * kSecond_ns;
 
 UsbEnd end_of(const libusb_transfer& t) noexcept {
     switch (t.status) {
@@ -73,7 +73,7 @@ Status UsbLink::start(Pool in, Pool out, int wake_fd) {
     return Ok{};
 }
 
-/// Those of the first interface that has what is wanted. What a device says of itself need not be true.
+/// Takes the endpoints of the first interface that has the wanted ones. The descriptors of a device may be wrong.
 Status UsbLink::find_endpoints(bool wants_in, bool wants_out) {
     libusb_config_descriptor* raw = nullptr;
     if (const int code = libusb_get_active_config_descriptor(libusb_get_device(device_.handle.get()), &raw);
@@ -106,11 +106,12 @@ Status UsbLink::find_endpoints(bool wants_in, bool wants_out) {
 UsbLink::~UsbLink() {
     closing_ = true;
     cancel(in_), cancel(out_);
-    for (const std::int64_t until_ns = monotonic_ns() + kFarewell_ns; any_under_way() && monotonic_ns() < until_ns;)
+    for (const std::int64_t until_ns = monotonic_ns() + kCloseTimeout_ns;
+         any_under_way() && monotonic_ns() < until_ns;)
         handle_events(10'000'000);
-    if (claimed_) libusb_release_interface(device_.handle.get(), interface_);  // the kernel's driver has it again
+    if (claimed_) libusb_release_interface(device_.handle.get(), interface_);  // reattaches the kernel's driver
     if (!any_under_way()) return;
-    // libusb still has some: their memory must outlive this.
+    // libusb still uses some transfers: leaks their memory, which must outlive this object.
     for (auto* transfers : {&in_, &out_})
         for (UsbTransfer& t : *transfers) (void)t.transfer.release();
     (void)device_.handle.release(), (void)device_.context.release();

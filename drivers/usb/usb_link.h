@@ -1,8 +1,8 @@
 /// drivers/usb/usb_link.h - a vendor-specific interface with bulk endpoints, claimed through libusb: control
 /// requests and asynchronous transfers.
 ///
-/// libusb allocates with every transfer and takes locks, so a link belongs to one thread that is not the loop's.
-/// Where the kernel has a driver for the interface, the link takes it over and gives it back at its end.
+/// libusb allocates with every transfer and takes locks, so a link is used by one thread, which is not the loop's.
+/// If the kernel has a driver for the interface, the link detaches it and reattaches it at its end.
 #pragma once
 
 #include <poll.h>
@@ -25,11 +25,11 @@ class UsbLink;
 /// How a transfer ended.
 enum class UsbEnd : std::uint8_t {
     whole,
-    partial,  ///< from the host: fewer bytes were taken than sent
+    partial,  ///< to the device: it has taken fewer bytes than were sent
     stalled,
     cancelled,
     gone,    ///< the device has been pulled out
-    failed,  ///< more than was asked for, or an error of the wire
+    failed,  ///< babble (more bytes than requested), or a bus error
 };
 
 /// A transfer and its memory, which the link keeps until libusb has let go of it.
@@ -43,8 +43,8 @@ struct UsbTransfer {
 
 class UsbLink {
 public:
-    /// Told of each transfer that has ended, on the thread that calls `serve` or destroys the link. In the latter
-    /// case the link is reached by the transfer alone.
+    /// Called for each transfer that has ended, on the thread that calls `serve` or destroys the link. During
+    /// destruction, only UsbTransfer::link leads to the link.
     class Client {
     public:
         virtual void received(UsbTransfer& transfer, UsbEnd end) noexcept = 0;
@@ -60,14 +60,14 @@ public:
     /// Claims the interface. `wake_fd`: `serve` also wakes when it can be read.
     static Result<std::unique_ptr<UsbLink>> open(const UsbKind& kind, std::string_view wanted, Client& client,
                                                  Pool in, Pool out, int wake_fd);
-    /// Cancels what is under way, waits at most 2 s for it, and gives the interface back.
+    /// Cancels pending transfers, waits at most 2 s for their end, and releases the interface.
     ~UsbLink();
     UsbLink(const UsbLink&) = delete;
     UsbLink& operator=(const UsbLink&) = delete;
 
     [[nodiscard]] const std::string& name() const noexcept { return device_.what.name(); }
     [[nodiscard]] bool gone() const noexcept { return gone_; }
-    /// The device is not to be used any more.
+    /// Marks the device as gone: it is not used any more.
     void give_up() noexcept { gone_ = true; }
 
     // --- Vendor requests to the interface; they wait at most a second ---
@@ -78,18 +78,18 @@ public:
     // --- Transfers ---
     [[nodiscard]] std::span<UsbTransfer> ins() noexcept { return in_; }
     [[nodiscard]] std::span<UsbTransfer> outs() noexcept { return out_; }
-    /// Begins one that is not under way: asks for as much as it holds, or sends its first `length` bytes. False:
-    /// the device is taken for gone.
+    /// Submit a transfer that is not under way: reads as much as it has room for, or sends its first `length`
+    /// bytes. False: the device counts as gone.
     bool receive(UsbTransfer& transfer) noexcept;
     bool send(UsbTransfer& transfer, std::size_t length) noexcept;
-    /// Waits for events, at most timeout_ns, and tells the client of them.
+    /// Waits for events, at most timeout_ns, and reports them to the client.
     void serve(std::int64_t timeout_ns) noexcept;
-    /// Asks for the end of all that are under way from the host; `serve` tells of it.
+    /// Cancels all pending transfers to the device; `serve` reports their end.
     void cancel_outs() noexcept;
-    /// After a stall of the endpoint towards the host, or from it. False: it cannot be cleared.
+    /// Clear a stall of the endpoint towards the host, or of the one to the device. False: not possible.
     [[nodiscard]] bool clear_halt_in() noexcept { return clear_halt(in_endpoint_.address); }
     [[nodiscard]] bool clear_halt_out() noexcept { return clear_halt(out_endpoint_.address); }
-    /// Of the endpoint from the host; a transfer that is a multiple of it does not end a message.
+    /// Packet size of the endpoint to the device. After a multiple of it, only an empty transfer ends the message.
     [[nodiscard]] std::size_t out_packet_bytes() const noexcept { return out_endpoint_.packet_bytes; }
 
 private:

@@ -26,17 +26,17 @@ namespace narpa {
 class UsbIpServer::Connection {
 public:
     Connection(Descriptor fd, UsbIpServer& server)
-        : fd_(std::move(fd)), server_(server), until_ns_(monotonic_ns() + kPatience_ns) {}
+        : fd_(std::move(fd)), server_(server), until_ns_(monotonic_ns() + kTimeout_ns) {}
 
     [[nodiscard]] bool imported() const noexcept { return imported_; }
     [[nodiscard]] pollfd wanted() const noexcept {
-        const bool reads = unsent() < kMostUnsent && !closing_;
+        const bool reads = unsent() < kMaxUnsent && !closing_;
         return {fd_.get(), static_cast<short>((reads ? POLLIN : 0) | (unsent() > 0 ? POLLOUT : 0)), 0};
     }
-    /// Of those that have not imported the device.
+    /// Deadline of a connection that has not imported the device.
     [[nodiscard]] std::int64_t until_ns() const noexcept { return imported_ ? INT64_MAX : until_ns_; }
 
-    /// False: it is over.
+    /// False: the connection has ended.
     bool proceed(short ready) {
         if (monotonic_ns() >= until_ns()) return false;
         if ((ready & (POLLERR | POLLHUP)) != 0 && (ready & POLLIN) == 0) return false;
@@ -46,7 +46,7 @@ public:
     }
 
 private:
-    static constexpr std::size_t kMostUnsent = 4 << 20, kMostHeld = 4 << 20;  // bytes
+    static constexpr std::size_t kMaxUnsent = 4 << 20, kMaxHeld = 4 << 20;  // bytes
     struct Transfer {
         UsbIpSubmit submit;
         std::vector<std::uint8_t> data;  // from the host
@@ -114,7 +114,7 @@ private:
         const auto& submit = std::get<UsbIpSubmit>(*request);
         const std::size_t follow = submit.to_host ? 0 : submit.length;
         if (bytes.size() < kUsbIpHeaderBytes + follow) return 0;
-        if (transfers_.size() == kTransfers || held_bytes_ + follow > kMostHeld) return -1;
+        if (transfers_.size() == kTransfers || held_bytes_ + follow > kMaxHeld) return -1;
         held_bytes_ += follow;
         const auto data = bytes.subspan(kUsbIpHeaderBytes, follow);
         transfers_.push_back({submit, {data.begin(), data.end()}});
@@ -122,7 +122,7 @@ private:
     }
 
     void give_up(const UsbIpUnlink& unlink) {
-        serve();  // what can be answered now was not given up in time
+        serve();  // transfers that can complete now were not cancelled in time
         const auto victim =
             std::ranges::find_if(transfers_, [&](const Transfer& t) { return t.submit.sequence == unlink.victim; });
         const bool pending = victim != transfers_.end();
@@ -136,10 +136,10 @@ private:
                            std::span(out_).subspan(at).first<kUsbIpHeaderBytes>());
     }
 
-    /// Answers what can be answered. Those of one endpoint and direction keep their order.
+    /// Completes the transfers that can be answered. Transfers of one endpoint and direction keep their order.
     void serve() {
         std::uint32_t held = 0;  // bit: endpoint, or 16 + endpoint towards the host
-        for (auto t = transfers_.begin(); t != transfers_.end() && unsent() < kMostUnsent;) {
+        for (auto t = transfers_.begin(); t != transfers_.end() && unsent() < kMaxUnsent;) {
             const std::uint32_t lane = 1u << ((t->submit.to_host ? 16 : 0) + t->submit.endpoint);
             if ((held & lane) != 0 || !answer(*t)) {
                 held |= lane;
@@ -177,7 +177,7 @@ private:
     }
 
     void put(std::span<const std::uint8_t> bytes) { out_.insert(out_.end(), bytes.begin(), bytes.end()); }
-    /// Index of so many new bytes.
+    /// Appends this many bytes to the output; returns the index of the first.
     std::size_t room_for(std::size_t bytes) {
         out_.resize(out_.size() + bytes);
         return out_.size() - bytes;
@@ -248,7 +248,7 @@ void UsbIpServer::run() noexcept {
         std::array<pollfd, 2 + kConnections> fds;
         fds[0] = {signal_.get(), POLLIN, 0};
         fds[1] = {connections_.size() == kConnections ? -1 : listening_.get(), POLLIN, 0};
-        std::int64_t until_ns = monotonic_ns() + kPatience_ns;
+        std::int64_t until_ns = monotonic_ns() + kTimeout_ns;
         for (std::size_t i = 0; i < connections_.size(); ++i) {
             fds[2 + i] = connections_[i]->wanted();
             until_ns = std::min(until_ns, connections_[i]->until_ns());
@@ -276,7 +276,7 @@ void UsbIpServer::drop(std::size_t i) noexcept {
 void UsbIpServer::accept_one() {
     Descriptor fd(::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!fd) {
-        if (errno == EMFILE || errno == ENFILE) wait_ready(std::span<pollfd>(), kPatience_ns / 50);
+        if (errno == EMFILE || errno == ENFILE) wait_ready(std::span<pollfd>(), kTimeout_ns / 50);
         return;
     }
     // A host that has lost power is noticed within half a minute.

@@ -1,8 +1,8 @@
 /// drivers/usb/usbip_server.h - serves one USB device in software to a Linux machine over TCP (USB/IP).
 ///
-/// The machine needs no module of ours: `usbip attach -r HOST -b 1-1` and its own drivers see a device on a cable.
-/// One host at a time has the device; others are told that it is busy. All is bounded: kConnections, kTransfers
-/// under way, a MiB each, and kPatience_ns for a connection that has not imported the device.
+/// The machine needs no kernel module of narpa: after `usbip attach -r HOST -b 1-1` its own drivers see a device as
+/// on a cable. One host at a time has the device; others are told that it is busy. All is bounded: kConnections,
+/// kTransfers under way, a MiB each, and kTimeout_ns for a connection that has not imported the device.
 #pragma once
 
 #include <atomic>
@@ -25,21 +25,21 @@ namespace narpa {
 struct UsbIpCounters {
     std::uint64_t plugged = 0;    ///< times that a host took the device
     std::uint64_t transfers = 0;  ///< answered
-    std::uint64_t unlinked = 0;   ///< given up by the host
-    std::uint64_t refused = 0;    ///< connections ended because of what came
+    std::uint64_t unlinked = 0;   ///< cancelled by the host
+    std::uint64_t refused = 0;    ///< connections closed because of invalid data
 };
 
 class UsbIpServer {
 public:
     static constexpr std::size_t kConnections = 8, kTransfers = 1024;
-    static constexpr std::int64_t kPatience_ns = 5'000'000'000;
+    static constexpr std::int64_t kTimeout_ns = 5'000'000'000;
     static constexpr std::string_view kBusId = "1-1";
 
     /// Listens at an IPv4 address; port 0: one that is free. `device` must outlive the server, and its descriptors
-    /// stay as they are. Errors: not an address; in use; not permitted; descriptors that are none.
+    /// stay as they are. Errors: not an address; in use; not permitted; invalid descriptors.
     static Result<std::unique_ptr<UsbIpServer>> start(const std::string& address, std::uint16_t port,
                                                       UsbDevice& device);
-    /// Pulls the cable.
+    /// Unplugs the device.
     ~UsbIpServer();
     UsbIpServer(const UsbIpServer&) = delete;
     UsbIpServer& operator=(const UsbIpServer&) = delete;

@@ -17,7 +17,7 @@ constexpr std::uint8_t kCanGetAndSet = 3;
 UsbDescriptors camera_descriptors(const VideoFormat& format, bool with_controls, std::string serial) {
     UsbDescriptors d;
     d.speed = UsbSpeed::high;
-    d.device.device_class = 0xef, d.device.subclass = 2, d.device.protocol = 1;  // interfaces belong together
+    d.device.device_class = 0xef, d.device.subclass = 2, d.device.protocol = 1;  // interface association
     d.device.vendor = UvcDevice::kVendor, d.device.product = UvcDevice::kProduct;
     d.device.maker_string = 1, d.device.product_string = 2, d.device.serial_string = 3;
     d.strings = {"narpa", "narpa camera", std::move(serial)};
@@ -33,7 +33,7 @@ int reply(std::span<std::uint8_t> room, std::uint32_t value, std::size_t bytes) 
     return static_cast<int>(n);
 }
 
-/// An exposure in the class's units, rounded into the limits.
+/// An exposure in units of kUvcExposureUnit_ns, rounded down, at least 1.
 std::uint32_t exposure_units(std::int64_t ns) noexcept {
     return static_cast<std::uint32_t>(std::max<std::int64_t>(1, ns / kUvcExposureUnit_ns));
 }
@@ -85,7 +85,8 @@ int UvcDevice::stream_control(const UsbSetup& setup, std::span<std::uint8_t> dat
         case UvcRequest::kSetCurrent: {
             const auto wanted = decode_uvc_probe(data);
             if (!wanted) return UsbAnswer::kStall;
-            // There is one of each: a probe is answered with it, and a commit is to be it.
+            // There is one format and one frame size: every probe is answered with them, and a commit must name
+            // them.
             if (selector == UvcControl::kCommit) {
                 if (wanted->format > 1 || wanted->frame > 1) return UsbAnswer::kStall;
                 set_streaming(false);
@@ -129,7 +130,7 @@ int UvcDevice::camera_control(const UsbSetup& setup, std::span<std::uint8_t> dat
     const bool is_mode = unit == UvcIds::kCamera && selector == UvcControl::kExposureMode;
     const bool is_time = unit == UvcIds::kCamera && selector == UvcControl::kExposureTime;
     const bool is_gain = unit == UvcIds::kProcessing && selector == UvcControl::kGain;
-    if (is_mode)  // a mask: the modes that there are stand for the step
+    if (is_mode)  // a bit mask: GET_RES returns the supported modes
         s = {1, mode(c), kManual, kAutomatic, kManual | kAutomatic, mode(at_start_)};
     else if (is_time)
         s = {4,

@@ -37,13 +37,14 @@ public:
         no_stream,  ///< no host wants frames
         broken,     ///< the stream ended, or time ran out, before the host had all of it
     };
-    /// Waits until the host has the frame. `wake`: UsbIpServer::wake. `gives_up` is asked every 20 ms.
+    /// Waits until the host has the frame. `wake`: UsbIpServer::wake. `gives_up` is called every 20 ms; true ends
+    /// the wait.
     Shown show(std::span<const std::uint8_t> frame, std::int64_t t_ns, const std::function<void()>& wake,
                const std::function<bool()>& gives_up);
     /// Times that a host has started the stream.
     [[nodiscard]] std::uint64_t streams() const noexcept { return streams_.load(std::memory_order_relaxed); }
 
-    /// What the host has set, in order; from one thread. False: nothing more.
+    /// The next setting from the host, in order; called from one thread. False: nothing more.
     bool next_request(VideoRequest& request) noexcept { return requests_.pop(request); }
 
 private:
@@ -63,7 +64,7 @@ private:
     std::mutex mutex_;
     std::condition_variable changed_;
     bool streaming_ = false, frame_id_ = false;
-    std::span<const std::uint8_t> frame_;  // what the host has not yet; its end
+    std::span<const std::uint8_t> frame_;  // the rest of the frame that the host has not read
     std::int64_t t_frame_ns_ = 0;
 };
 

@@ -25,7 +25,7 @@ namespace {
 
 const std::string kVhci = "/sys/devices/platform/vhci_hcd.0/";
 constexpr unsigned kFree = 4;  // VDEV_ST_NULL of the kernel's usbip_common.h
-constexpr std::int64_t kLetGo_ns = 10 * kSecond_ns;
+constexpr std::int64_t kDetachTimeout_ns = 10 * kSecond_ns;
 
 struct VhciStatus {
     bool is_super_speed = false;
@@ -126,7 +126,7 @@ VhciPort::~VhciPort() {
             if (p.number == number_) return p.state == kFree;
         return true;
     };
-    for (const std::int64_t until_ns = monotonic_ns() + kLetGo_ns; !is_free() && monotonic_ns() < until_ns;)
+    for (const std::int64_t until_ns = monotonic_ns() + kDetachTimeout_ns; !is_free() && monotonic_ns() < until_ns;)
         wait_ready({}, 10'000'000);
 }
 

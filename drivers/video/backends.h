@@ -20,17 +20,17 @@ public:
     /// An item: the stamp, then the frame.
     void write(std::span<const std::uint8_t> item, const WriteQueue& queue) noexcept final;
     void abandon(std::span<const std::uint8_t>) noexcept override { ++failed; }
-    /// As VideoSink's.
+    /// See VideoSink::next_request.
     virtual bool next_request(VideoRequest& /*request*/) noexcept { return false; }
 
     std::atomic<std::uint64_t> written{0}, no_reader{0}, failed{0}, reconnects{0};
     std::atomic<int> file_error{0};  ///< errno of a file that did not take a frame
 };
-/// The sink of a writer, which gets frames of the format alone.
+/// A sink that queues frames for the writer. It counts frames of another size as failed.
 std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, const VideoFormat& format,
                                        WhenFull full, std::string description);
 
-/// Checks the device, its format and starts it; a device that vanishes later is looked for once a second.
+/// Opens the device, checks its format and starts it; a device that vanishes later is looked for once a second.
 Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const VideoFormat& format,
                                                   WhenFull full);
 /// `address`: [HOST:]PORT to listen at for hosts that attach the camera.
@@ -42,7 +42,7 @@ Result<std::unique_ptr<VideoSink>> open_bulk_sink(std::string_view text, const V
 Result<std::unique_ptr<VideoSink>> open_y4m_sink(const std::string& path, bool fifo, const VideoFormat& format,
                                                  WhenFull full);
 
-/// A device that is no camera yet (v4l2loopback before its writer's first frame) is looked at again.
+/// A device that is no camera yet (v4l2loopback before its writer's first frame) is tried again.
 Result<std::unique_ptr<VideoSource>> open_v4l2_source(const std::string& path, const VideoFormat& format);
 /// `address`: [HOST:]PORT to listen at for the host that attaches the bridge.
 Result<std::unique_ptr<VideoSource>> open_bridge_source(std::string_view address, const VideoFormat& format);

@@ -12,10 +12,10 @@
 namespace narpa {
 
 struct BulkSpec {
-    std::optional<UsbId> id{};  ///< absent: those that are known
-    std::string device{};       ///< serial number, or the place of the plug (1-4.2); empty: the only one
+    std::optional<UsbId> id{};  ///< absent: the known bridges
+    std::string device{};       ///< serial number, or the port path (1-4.2); empty: the only one
 };
-/// What follows `bulk:`, [VENDOR:PRODUCT/][SERIAL|BUS-PORT]; ids are hexadecimal.
+/// Parses the text after `bulk:`, [VENDOR:PRODUCT/][SERIAL|BUS-PORT]; ids are hexadecimal.
 Result<BulkSpec> parse_bulk(std::string_view text);
 
 /// Error: built without libusb, or a machine without USB.

@@ -47,10 +47,11 @@ constexpr std::array<UsbId, 2> kBridgeIds{{{0x04b4, 0x00f1}, {0x1209, 0x0002}}};
 namespace {
 
 constexpr std::size_t kTransfers = 8, kTransferBytes = 65536;
-constexpr std::int64_t kBridgePatience_ns = kSecond_ns;  // with a bridge that takes nothing
-constexpr std::int64_t kServePeriod_ns = 20'000'000;     // how often the time that is left is checked
+constexpr std::int64_t kBridgeTimeout_ns = kSecond_ns;  // without progress of the transfers
+constexpr std::int64_t kServePeriod_ns = 20'000'000;    // how often the time that is left is checked
 
-/// A frame in transfers: what ends a frame that was cut short, header and pixels, and what ends this one.
+/// Splits a frame into transfers: an empty one that ends a frame that was cut short, header and pixels, and an
+/// empty one if this frame would end with a full packet.
 class FramePieces {
 public:
     FramePieces(std::span<const std::uint8_t> header, std::span<const std::uint8_t> pixels, bool after_a_cut,
@@ -92,7 +93,7 @@ public:
         if (!link) return link.error();
         link_ = *std::move(link);
         spec_.device = link_->name();  // the same one when it is plugged in again
-        cut_ = true;                   // what was sent to it before is not known
+        cut_ = true;                   // bytes of an earlier frame may be in the bridge
         return Ok{};
     }
     [[nodiscard]] std::string description() const {
@@ -115,14 +116,14 @@ private:
         if (!retry_.due()) return false;
         try {
             if (!open()) return false;
-        } catch (const std::exception&) {  // no memory left: tried again
+        } catch (const std::exception&) {  // out of memory: retried
             return false;
         }
         ++reconnects;
         return true;
     }
 
-    /// All of it, or false.
+    /// Sends the whole frame; false: it was cut short.
     bool send(FramePieces& pieces, const WriteQueue& queue) noexcept {
         went_wrong_ = stalled_ = false;
         t_progress_ns_ = monotonic_ns();
@@ -131,7 +132,7 @@ private:
             for (UsbTransfer& t : outs)
                 if (!t.under_way && !pieces.empty() && !went_wrong_) link_->send(t, pieces.next(t.bytes));
             if (went_wrong_ || link_->gone() || queue.time_left_ms() == 0 ||
-                monotonic_ns() - t_progress_ns_ > kBridgePatience_ns) {
+                monotonic_ns() - t_progress_ns_ > kBridgeTimeout_ns) {
                 take_back();
                 cut_ = went_wrong_ || !pieces.empty() || !link_;  // not if it ended just then
                 return !cut_;
@@ -143,11 +144,11 @@ private:
         return true;
     }
 
-    /// Cancels what is under way, and makes the bridge ready for the next frame or gives it up.
+    /// Cancels pending transfers, and makes the bridge ready for the next frame or closes it.
     void take_back() noexcept {
         if (!link_->gone()) {
             link_->cancel_outs();
-            for (const std::int64_t until_ns = monotonic_ns() + kBridgePatience_ns;
+            for (const std::int64_t until_ns = monotonic_ns() + kBridgeTimeout_ns;
                  any_under_way() && !link_->gone() && monotonic_ns() < until_ns;)
                 link_->serve(kServePeriod_ns);
             if (any_under_way() || (stalled_ && !link_->clear_halt_out())) link_->give_up();

@@ -46,8 +46,8 @@ Result<std::unique_ptr<VideoSink>> open_uvc_sink(std::string_view address, const
     if (!uvc_carries(format.pixel))
         return Error{"uvc:" + std::string(address) + ": a USB camera here carries GREY, Y16 and YUYV, not " +
                      std::string(name(format.pixel)) + "; expected another format of the camera in the scene"};
-    constexpr int kMost = 65535;  // of a frame descriptor
-    if (format.width > kMost || format.height > kMost)
+    constexpr int kMax = 65535;  // of a frame descriptor
+    if (format.width > kMax || format.height > kMax)
         return Error{"uvc:" + std::string(address) + ": expected at most 65535 pixels each way"};
     auto writer = std::make_unique<UvcWriter>(format, controls);
     if (auto started = writer->start(*at); !started) return started.error();

@@ -8,17 +8,17 @@
 #include "drivers/video/backends.h"
 #include "drivers/video/v4l2_device.h"
 
-// v4l2loopback 0.12.7 (Debian 12) decides the way here: memory-mapped output always returns the same buffer, so
-// frames go by write(); an unknown format is "accepted" as another, so the result is compared; without
-// STREAMON before the first write the device is unusable once the writer has closed it, and newer versions (0.13)
-// refuse that same STREAMON with EINVAL, harmlessly. See v4l2loopback issues 191, 442 and 607.
+// The method follows v4l2loopback 0.12.7 (Debian 12): memory-mapped output always returns the same buffer, so
+// frames go by write(); an unknown format is "accepted" as another, so the result is compared; without STREAMON
+// before the first write the device is unusable once the writer has closed it, and newer versions (0.13) refuse
+// that same STREAMON with EINVAL, harmlessly. See v4l2loopback issues 191, 442 and 607.
 
 namespace narpa {
 namespace {
 
 enum class Step : std::uint8_t { open, query, output, format_call, format_kept, stream, started };
 
-// How far the start of a device came; made into words only when a person is there to read them.
+// The step that the start of a device reached. Only error messages turn it into text.
 struct Start {
     Step step = Step::open;
     int error = 0;

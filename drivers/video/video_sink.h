@@ -31,13 +31,13 @@ struct FrameStamp {
     std::uint32_t number = 0;  ///< +1 with every frame that falls due
 };
 
-/// What a camera lets the reader of its frames set, where the sink is a device with controls.
+/// Limits and start values of the settings that a reader may change, for sinks with controls.
 struct VideoControls {
     std::int64_t exposure_min_ns = 0, exposure_max_ns = 0, exposure_ns = 0;
     std::int16_t gain_max_cdb = 0, gain_cdb = 0;  ///< 0.01 dB
     bool auto_exposure = false;
 };
-/// What the reader has set, within the limits; what is absent stays.
+/// Settings that the reader has changed, within the limits; absent ones are unchanged.
 struct VideoRequest {
     std::optional<std::int64_t> exposure_ns{};
     std::optional<std::int16_t> gain_cdb{};
@@ -60,7 +60,7 @@ public:
     /// An Error when the sink is a file that did not take every frame; final after a flush.
     [[nodiscard]] virtual Status failure() const { return Ok{}; }
     [[nodiscard]] virtual std::string description() const = 0;
-    /// The next thing that the reader has set; false: nothing more. From one thread.
+    /// The next request of the reader; false: none. To be called from one thread.
     virtual bool next_request(VideoRequest& /*request*/) noexcept { return false; }
 };
 

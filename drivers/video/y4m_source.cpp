@@ -54,7 +54,7 @@ private:
     enum class Part : std::uint8_t { stream_header, frame_header, samples };
     enum class Progress : std::uint8_t { frame, going_on, nothing, end };
 
-    /// Reads on, as far as one read goes.
+    /// Calls read() once and processes the bytes.
     Progress advance() {
         if (part_ == Part::samples) {
             const Progress progress = read_into({samples_.data() + filled_, samples_.size() - filled_});
@@ -99,7 +99,7 @@ private:
         begin(Part::samples);
     }
 
-    /// Its successor begins with a header; what is left of this one's last frame is no frame.
+    /// The next writer begins with a stream header; an unfinished frame of this one is dropped and counted.
     void writer_left() noexcept {
         if (part_ == Part::samples || (part_ == Part::frame_header && filled_ > 0)) ++counters_.truncated;
         begin(Part::stream_header);

@@ -73,8 +73,8 @@ void ContactSheet::thin_out() noexcept {
 }
 
 void ContactSheet::shrink(std::span<const std::uint8_t> bytes, std::span<std::uint8_t> bgr) const noexcept {
-    // A thumbnail's pixel shows at most 2 x 2, evenly spread over those that it stands for: to read all of a frame
-    // of four million takes 37 ms.
+    // A thumbnail's pixel is the mean of at most 2 x 2 source pixels, evenly spread over its block: reading all
+    // four million pixels of a frame takes 37 ms.
     const int side = std::min(scale_, 2), area = side * side;
     const auto at = [&](int i, int k) { return i * scale_ + (2 * k + 1) * scale_ / (2 * side); };
     for (int y = 0; y < height_; ++y) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kFreedom = 6;
 
-/// Of one frame against the truth; zeros where there is no pose.
+/// Errors of one frame against the truth; zeros where there is no pose.
 struct Errors {
     explicit Errors(const TrackedFrame& f) {
         if (f.measured) vector = error_between(*f.measured, f.truth);
@@ -26,7 +26,7 @@ struct Errors {
     [[nodiscard]] double filtered_rotation() const { return filtered.head<3>().norm(); }
     [[nodiscard]] double filtered_position() const { return filtered.tail<3>().norm(); }
 };
-/// RMS of what is added.
+/// RMS of the added values.
 struct Squares {
     double sum = 0;
     std::size_t n = 0;
@@ -96,7 +96,7 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
         const Errors e(f);
         ++s.answers[static_cast<std::size_t>(f.answer.kind)];
         if (f.answer.kind == AnswerKind::good && f.measured)
-            s.beyond += !(normalised_error_squared(e.vector, f.covariance) <= kBeyondNees);
+            s.beyond += !(normalised_error_squared(e.vector, f.covariance) <= kSixSigmaNees);
         if (f.state != EstimateState::lost)
             filtered_turn.add(e.filtered_rotation()), filtered_shift.add(e.filtered_position());
         if (f.state != EstimateState::measured || !f.measured) continue;
@@ -123,7 +123,7 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
         const auto middle = ms.begin() + static_cast<std::ptrdiff_t>(ms.size() / 2);
         std::nth_element(ms.begin(), middle, ms.end());
         s.ms_median = *middle;
-        s.ms_most = *std::max_element(ms.begin(), ms.end());
+        s.ms_max = *std::max_element(ms.begin(), ms.end());
     }
     return s;
 }
@@ -148,10 +148,10 @@ nlohmann::json to_json(const EstimateSummary& s) {
             {"rotation_of_bound", s.rotation_of_bound},
             {"position_of_bound", s.position_of_bound},
             {"ms_median", s.ms_median},
-            {"ms_most", s.ms_most}};
+            {"ms_max", s.ms_max}};
 }
 
-std::string in_words(const EstimateSummary& s) {
+std::string to_text(const EstimateSummary& s) {
     std::string out = fmt::format("{} of {} frames gave a pose that the filter accepted\n", s.measured, s.frames);
     out += fmt::format(
         "    answers: {} good, {} ambiguous, {} unobservable in some motions, {} refused; {} good ones "
@@ -168,7 +168,7 @@ std::string in_words(const EstimateSummary& s) {
         out += fmt::format("    NEES {:.2f}, 6 expected, 95 % band {:.2f} to {:.2f}; {}\n", s.nees_mean, s.nees_low,
                            s.nees_high, nees_verdict(s.nees_mean, s.nees_low, s.nees_high));
     if (s.nis_mean > 0) out += fmt::format("    NIS {:.2f}, 6 expected\n", s.nis_mean);
-    return out + fmt::format("    {:.0f} ms per frame (median; max {:.0f})\n", s.ms_median, s.ms_most);
+    return out + fmt::format("    {:.0f} ms per frame (median; max {:.0f})\n", s.ms_median, s.ms_max);
 }
 
 Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames) {

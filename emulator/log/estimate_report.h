@@ -18,7 +18,7 @@ inline constexpr std::string_view kEstimateHeader =
 /// values are empty.
 [[nodiscard]] std::string estimate_row(const TrackedFrame& frame);
 
-/// Its class, why it is not good, the motions that are not observed, and other poses that are as likely.
+/// Its class, why it is not good, the unobservable motions, and other poses that are as likely.
 [[nodiscard]] nlohmann::json to_json(const Answer& answer);
 [[nodiscard]] nlohmann::json to_json(const Rigid3& pose);
 
@@ -26,28 +26,29 @@ inline constexpr std::string_view kEstimateHeader =
 struct EstimateSummary {
     std::size_t frames = 0, measured = 0;                    ///< all; those whose pose the filter accepted
     std::array<std::size_t, kAnswerKinds.size()> answers{};  ///< frames of each class
-    /// Of the good answers, those whose error is beyond 6 sigma (kBeyondNees): wrong in silence.
+    /// Good answers whose error is beyond 6 sigma (kSixSigmaNees): failures that were not detected.
     std::size_t beyond = 0;
     double rotation_rms_rad = 0, position_rms_m = 0, position_rms_of_range = 0;
     double filtered_rotation_rms_rad = 0, filtered_position_rms_m = 0;  ///< over all frames with a track
-    double nees_mean = 0;                                               ///< 6 where the covariances are right
-    double nees_low = 0, nees_high = 0;  ///< 95 % of means over so many frames lie between, if they are
+    double nees_mean = 0;                                               ///< 6 if the covariances are correct
+    double nees_low = 0, nees_high = 0;  ///< 95 % interval of a mean over this many frames, if they are correct
     double nis_mean = 0;
     double rotation_of_bound = 0, position_of_bound = 0;  ///< RMS of error / Cramer-Rao bound; 0: no bound
-    double ms_median = 0, ms_most = 0;
+    double ms_median = 0, ms_max = 0;
 };
-/// A right covariance has a larger NEES in five of 10^9 answers, as few as a normal variable beyond 6 sigma.
-inline constexpr double kBeyondNees = 50;
-/// 95 % of the NEES of one pose lie between (chi-square with 6 degrees of freedom), where the covariance is right.
+/// With a correct covariance, five of 10^9 answers have a larger NEES: about as few as a normal variable has beyond
+/// 6 sigma.
+inline constexpr double kSixSigmaNees = 50;
+/// 95 % interval of the NEES of one pose (chi-square with 6 degrees of freedom), if the covariance is correct.
 inline constexpr double kNeesLow = 1.237, kNeesHigh = 14.449;
-/// Where a NEES lies, and what follows: "inside: the errors are as the covariances say".
+/// The interpretation of a NEES as text: "inside: the errors are as the covariances say".
 [[nodiscard]] std::string nees_verdict(double nees, double low, double high);
 [[nodiscard]] EstimateSummary summarise(std::span<const TrackedFrame> frames);
 [[nodiscard]] nlohmann::json to_json(const EstimateSummary& summary);
-[[nodiscard]] std::string in_words(const EstimateSummary& summary);
+[[nodiscard]] std::string to_text(const EstimateSummary& summary);
 
-/// Plots (plot/plot.h) the errors of every frame over time, in rotation and in position, within three standard
-/// deviations and above the bound.
+/// Plots (plot/plot.h) the errors of every frame over time, in rotation and in position, with three standard
+/// deviations and the Cramer-Rao bound.
 Status plot_estimates(const std::string& path, const std::string& title, std::span<const TrackedFrame> frames);
 
 }  // namespace narpa

@@ -15,7 +15,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::uint64_t kMostSpp = 65535;
+constexpr std::uint64_t kMaxSpp = 65535;
 
 /// Rows are formatted into a buffer that may be too short: `size` counts on, and what does not fit is left out.
 struct RowBuffer {
@@ -91,12 +91,12 @@ std::string read_cell(std::string_view text, const LedgerField&, FrameLedger::Pa
     return passes[cells.size() - 1] > 0 ? "" : expected;
 }
 
-/// What a column must be beside those before it.
+/// Checks a cell against the columns before it. Returns what was expected, or nothing.
 std::string check_cell(const LedgerField& field, const FrameLedger& l) {
     if (field.name == "passes" && std::accumulate(l.passes.begin(), l.passes.end(), std::uint64_t{0}) > l.samples)
         return "numbers of samples, together at most as many as the frame's";
-    if (field.name == "budget" && l.budget_kind == BudgetKind::samples && (l.budget < 1 || l.budget > kMostSpp))
-        return fmt::format("samples for each pixel, 1 to {}", kMostSpp);
+    if (field.name == "budget" && l.budget_kind == BudgetKind::samples && (l.budget < 1 || l.budget > kMaxSpp))
+        return fmt::format("samples for each pixel, 1 to {}", kMaxSpp);
     if (field.name == "binning" && l.binning < 1) return "a whole number from 1 to 255";
     return "";
 }

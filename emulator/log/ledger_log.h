@@ -1,5 +1,5 @@
-/// emulator/log/ledger_log.h - CAMERA.ledger.csv: a row for each frame of a run, written by the camera's feed and
-/// read by `narpa replay`.
+/// emulator/log/ledger_log.h - CAMERA.ledger.csv: a row for each frame of a run, written by CameraSensor and read
+/// by `narpa replay`.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ namespace narpa {
 std::size_t format_ledger_row(std::span<char> out, const FrameLedger& ledger, std::uint32_t crc32) noexcept;
 
 struct LoggedFrame {
-    FrameLedger ledger;  ///< but for the camera's index, which is not in the log
+    FrameLedger ledger;  ///< except the camera's index, which is not in the log
     std::uint32_t image_crc32 = 0;
     int line = 0;  ///< of the log
 };

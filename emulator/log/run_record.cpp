@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 using Method = RenderSettings::Method;
 
-constexpr int kFormat = 1;  ///< raised when what is written changes its meaning
+constexpr int kFormat = 1;  ///< increased when the format changes its meaning
 constexpr const char *kDirect = "direct", *kPath = "path";
 
 std::string file_in(const std::string& folder) {
@@ -34,7 +34,7 @@ Error error_at(const std::string& file, const std::string& text, std::size_t off
     return {std::move(what), file, line, static_cast<int>(before.size() - (before.rfind('\n') + 1)) + 1};
 }
 
-/// What a key must hold.
+/// A key and the check of its value.
 struct Key {
     const char* at;  ///< JSON pointer
     std::function<bool(const json&)> is_good;
@@ -49,7 +49,7 @@ Key whole_number(const char* at, std::uint64_t least, std::uint64_t most) {
             fmt::format("a whole number from {} to {}", least, most)};
 }
 
-/// What a run has logged under the names of its sensors.
+/// Endings of the files that a run logs under the names of its sensors.
 constexpr std::array<std::string_view, 7> kEndings{
     ".truth.csv", ".ledger.csv", ".estimate.csv", ".estimate.png", ".estimate.json", ".sweeps.csv", ".shots.csv"};
 constexpr std::string_view kLedgerEnding = kEndings[1];

@@ -11,7 +11,7 @@
 namespace narpa {
 namespace {
 
-/// Of a VLP-16 for 0.4 s, of an OS1-128 for 0.05 to 0.1 s.
+/// Lines that the ring holds: 0.4 s of a VLP-16, 0.05 to 0.1 s of an OS1-128.
 constexpr std::size_t kShotLines = 1 << 17;
 
 template <class... Args>

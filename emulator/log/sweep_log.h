@@ -34,8 +34,8 @@ struct SweepLedger {
 inline constexpr std::string_view kSweepHeader =
     "sweep,t_first_shot_ns,t_last_shot_ns,packets,packets_late,packets_skipped,shots,returns,t_complete_ns,"
     "t_hand_over_ns,hand_over_max_ns,packets_crc32,packets_lost\n";
-/// Of LIDAR.shots.csv and of `narpa scan -o FILE.csv`. First the truth of the beam's axis, then what the packets
-/// state of it before rounding.
+/// Header of LIDAR.shots.csv and of `narpa scan -o FILE.csv`: the truth of the beam's axis, then what the packets
+/// state of it, before rounding.
 inline constexpr std::string_view kShotHeader =
     "t_ns,packet,block,laser,azimuth_rad,elevation_rad,range_m,x_m,y_m,z_m,reflectivity,body,incidence_rad,"
     "velocity_m_s,reported_range_m,reported_reflectivity,reported_velocity_m_s,second_range_m,second_"
@@ -55,7 +55,7 @@ public:
     /// The packet that the unit has just fired and that was due and sent at these times. `lost`: datagrams so far.
     void add(const LidarUnit& unit, std::int64_t packet, std::int64_t t_due_ns, std::int64_t t_sent_ns, bool late,
              std::uint64_t lost) noexcept;
-    /// So many packets were left out after the last one.
+    /// This many packets were left out after the last one.
     void skip(std::uint64_t packets) noexcept { sweep_.skipped += packets; }
     /// Writes the last sweep and closes the files; an Error when any row was lost. `lost`: as in add.
     Status close(std::uint64_t lost);

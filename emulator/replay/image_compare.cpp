@@ -40,7 +40,8 @@ double mean_ssim(const cv::Mat& a, const cv::Mat& b) {
     return cv::mean(ratio)[0];
 }
 
-/// How far the picture's edges lie off the reference's, each where the gradient is steepest along itself.
+/// Shifts of the picture's edges from the reference's, at pixels where the gradient has a maximum along its own
+/// direction.
 ShiftStatistics edge_shifts(const cv::Mat& picture, const cv::Mat& reference) {
     const int width = reference.cols, height = reference.rows;
     const auto slope = [&](int x, int y) {
@@ -98,7 +99,7 @@ std::map<int, cv::Mat> masks_of(std::span<const std::int32_t> body, int width, i
     return alone;
 }
 
-/// Where the light under the mask has its centre; none where there is none, or where the border cuts it.
+/// Centroid of the light under the mask; none without light, or where the border cuts it.
 std::optional<cv::Point2d> centre_of_light(const cv::Mat& image, const cv::Mat& mask) {
     cv::Mat light = cv::Mat::zeros(image.size(), CV_64F);
     image.copyTo(light, mask);

@@ -13,7 +13,7 @@ namespace narpa {
 /// Signed distances, px.
 struct ShiftStatistics {
     std::size_t count = 0;
-    double mean_px = 0, rms_px = 0, p99_px = 0;  ///< the last of the magnitude
+    double mean_px = 0, rms_px = 0, p99_px = 0;  ///< p99_px: of the magnitude
 };
 
 struct BodyShift {

@@ -51,7 +51,7 @@ private:
     std::string file_;
 };
 
-/// Where the bodies and the camera were in each of the frames, in the frames' order.
+/// Poses of the bodies and the camera in each frame, in the frames' order.
 struct LoggedPlacements {
     std::vector<BodyPoses> bodies;
     std::vector<CameraPose> cameras;
@@ -82,7 +82,7 @@ Result<LoggedPlacements> placements_of(const std::vector<LoggedFrame>& frames, c
     return placements;
 }
 
-/// An operated camera can have been set as each frame states.
+/// Checks that an operated camera can have had the settings that each frame states.
 Status check_settings(const std::vector<LoggedFrame>& frames, const Camera& camera,
                       const std::string& ledger_file) {
     if (!camera.control) return Ok{};
@@ -201,8 +201,8 @@ std::vector<std::string> Replay::make(std::size_t i) {
     return differs;
 }
 
-/// The embedded line is written just before the hand-over: whether the deadline was met then is not in the log
-/// where it was missed after all.
+/// The embedded line is written just before the hand-over. Where the log says that the deadline was missed, it may
+/// have passed in between, so both values of the flag in the line are tried.
 bool Replay::bytes_repeat(const LoggedFrame& logged) {
     if (!camera_.embedded_line) return image_crc32(bytes_) == logged.image_crc32;
     FrameLedger line = logged.ledger;

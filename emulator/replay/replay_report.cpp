@@ -16,10 +16,10 @@ namespace {
 
 using nlohmann::json;
 
-/// A reference's error above this part of a frame's shows in the frame's numbers.
+/// A reference error above this fraction of a frame's error affects the frame's numbers.
 constexpr double kGoodReference = 1.0 / 3;
 
-/// Of the bodies' centres; nothing where none was measured.
+/// Largest shift of a body's centroid; empty where none was measured.
 std::optional<double> largest_shift_px(const ImageDifference& d) {
     std::optional<double> most;
     for (const BodyShift& b : d.bodies) most = std::max(most.value_or(0), std::hypot(b.x_px, b.y_px));
@@ -65,7 +65,7 @@ BudgetCost budget_cost(std::span<const ReplayedFrame> frames) {
         c.rmse_largest = std::max(c.rmse_largest, rmse);
         c.bias += d.bias / d.full_scale;
         ssim += d.ssim;
-        c.ssim_least = std::min(c.ssim_least, d.ssim);
+        c.ssim_min = std::min(c.ssim_min, d.ssim);
         const auto pixels = static_cast<double>(d.edges.count);
         c.edges.count += d.edges.count;
         edges += pixels * d.edges.mean_px;
@@ -132,7 +132,7 @@ json to_json(const BudgetCost& c) {
         {"reference_error", c.reference_error},
         {"predicted_over_measured", c.predicted_over_measured ? json(*c.predicted_over_measured) : json(nullptr)},
         {"ssim_mean", c.ssim_mean},
-        {"ssim_least", c.ssim_least},
+        {"ssim_min", c.ssim_min},
         {"edges", to_json(c.edges)},
         {"bodies",
          {{"centroids", c.bodies},
@@ -142,7 +142,7 @@ json to_json(const BudgetCost& c) {
           {"largest_px", c.bodies_largest_px}}}};
 }
 
-std::string in_words(std::span<const ReplayedFrame> frames, const BudgetCost& cost) {
+std::string to_text(std::span<const ReplayedFrame> frames, const BudgetCost& cost) {
     const auto row = [](const std::string& frame, const std::string& t, std::string_view step,
                         const std::string& spp, double rmse, double bias, const std::optional<double>& predicted,
                         double ssim, const ShiftStatistics& edges, const std::optional<double>& bodies_px) {
@@ -169,7 +169,7 @@ std::string in_words(std::span<const ReplayedFrame> frames, const BudgetCost& co
     out += fmt::format(
         "worst: RMSE {:.4f} %, SSIM {:.5f}, 1 % of the edges beyond {:.3f} px{}; the reference's own "
         "error {:.4f} %\n",
-        100 * cost.rmse_largest, cost.ssim_least, cost.edges.p99_px,
+        100 * cost.rmse_largest, cost.ssim_min, cost.edges.p99_px,
         cost.bodies > 0 ? fmt::format(", a body {:.4f} px", cost.bodies_largest_px) : "",
         100 * cost.reference_error);
     if (cost.reference_error > kGoodReference * cost.rmse)
@@ -181,19 +181,19 @@ std::string in_words(std::span<const ReplayedFrame> frames, const BudgetCost& co
 
 namespace {
 
-constexpr int kMostWidth = 640;  // px; wider images are halved until they fit
+constexpr int kMaxWidth = 640;   // px; wider images are halved until they fit
 constexpr double kShown = 0.98;  // part of the differences within the range of the colours
 
 nlohmann::json image_of(cv::Mat pixels) {
     cv::Mat shown = pixels;
     int parts = 1;
-    while (pixels.cols / parts > kMostWidth) parts *= 2;
+    while (pixels.cols / parts > kMaxWidth) parts *= 2;
     if (parts > 1)
         cv::resize(pixels, shown, {pixels.cols / parts, std::max(1, pixels.rows / parts)}, 0, 0, cv::INTER_AREA);
     return plot_image(shown.cols, shown.rows, shown.channels(), {shown.data, shown.total() * shown.elemSize()});
 }
 
-/// As a display shows it; full scale is white.
+/// The image as sRGB; full scale is white.
 nlohmann::json as_seen(const RadianceImage& image, double full_scale) {
     cv::Mat rgb(image.height, image.width, CV_8UC3);
     std::transform(image.pixels.begin(), image.pixels.end(), rgb.begin<cv::Vec3b>(), [&](const Rgb& p) {
@@ -203,7 +203,7 @@ nlohmann::json as_seen(const RadianceImage& image, double full_scale) {
     return image_of(rgb);
 }
 
-/// The differences of the mean bands as parts of full scale, and how large nearly all of them are at most.
+/// Differences of the mean bands as fractions of full scale, and the magnitude that kShown of them do not exceed.
 struct Differences {
     std::vector<double> of;
     double range = 0;
@@ -229,7 +229,7 @@ Status plot_replay(const std::string& path, const std::string& title, const Repl
     const ImageDifference& d = frame.compared->difference;
     const Differences off = differences(picture, reference, d.full_scale);
     cv::Mat signed_bytes(picture.height, picture.width,
-                         CV_8U);  // 127: as the reference; 0 and 254: the range's ends
+                         CV_8U);  // 127: no difference; 0 and 254: ends of the range
     std::transform(off.of.begin(), off.of.end(), signed_bytes.begin<std::uint8_t>(), [&](double part) {
         return static_cast<std::uint8_t>(std::lround(127 + 127 * std::clamp(part / off.range, -1.0, 1.0)));
     });

@@ -9,20 +9,20 @@
 namespace narpa {
 namespace {
 
-/// Beams that meet a surface at a flatter angle are not used.
+/// Beams with a flatter angle of incidence (cosine below this) are not used.
 constexpr double kGrazingCosine = 0.05;
 
-/// From the plane of the axis's hit, in standard deviations of the range, beyond which a ray of the footprint is on
-/// another surface: steps that are as small in the mean of a footprint's range as this do no harm to a thousand
-/// points.
+/// A ray of the footprint is on another surface if its hit is further than this from the tangent plane at the
+/// axis's hit, in standard deviations of the range. Smaller steps, averaged over the footprint, do not bias the
+/// pose of even a thousand points.
 constexpr double kOnPlane = 0.1;
-/// Another surface: of a normal that is turned by more than the angle of this cosine; a point lies on it within so
-/// many standard deviations.
+/// Another surface: its normal differs by more than the angle with cosine kOtherSurface; a point lies on it within
+/// kOnOther standard deviations.
 constexpr double kOtherSurface = 0.87, kOnOther = 3;
-/// The rim that is searched for edges, in parts of the footprint's radius.
+/// Radius of the cone that is searched for edges, over the footprint's radius.
 constexpr double kWider = 1.1;
 
-/// Sixteen places of even density on a disc of radius 1, the first in its middle.
+/// Sixteen evenly distributed points on the unit disc, the first at its centre.
 const std::array<std::array<double, 2>, kLanes>& disc() {
     static const auto places = [] {
         std::array<std::array<double, 2>, kLanes> d{};
@@ -48,7 +48,7 @@ Ray ray_in_cone(const Ray& beam, double tangent, int k) noexcept {
     constexpr int kRim = kConeRays / 2;
     const Vec3& d = beam.direction;
     const Vec3 x = normalized(std::abs(d.x) < 0.7 ? cross(d, Vec3{1, 0, 0}) : cross(d, Vec3{0, 1, 0}));
-    // Hexagons about the rim and inside of it.
+    // Even k: hexagon circumscribed about the rim; odd k: at half of its radius.
     const double turn = kPi * k / kRim, radius = (k % 2 == 0 ? 1 : 0.5) * tangent / std::cos(kPi / kRim);
     return {beam.origin, normalized(d + radius * (std::cos(turn) * x + std::sin(turn) * cross(d, x)))};
 }
@@ -90,7 +90,7 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
         along_beams(T, stride, out);
     for (std::size_t k = 0; k < out.size(); ++k) {
         PointToPlane& p = out[k];
-        if (p.fate != BeamFate::met) continue;
+        if (p.fate != BeamClass::met) continue;
         const Beam& beam = beams_[k * stride];
         const double cosine = -dot(p.normal, conjugate(T.q) * beam.direction);
         if (search_m > 0) {
@@ -98,7 +98,7 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
             continue;
         }
         if (!(cosine >= kGrazingCosine)) {
-            p.fate = BeamFate::grazing;
+            p.fate = BeamClass::grazing;
             continue;
         }
         const double along = noise.range_m * cosine;
@@ -122,9 +122,9 @@ void BeamAssociation::along_beams(const Rigid3& T, std::size_t stride, std::vect
         for (std::size_t lane = 0; lane < rays.n; ++lane) {
             const Beam& beam = beams_[index[lane]];
             PointToPlane& p = out[index[lane] / stride] = {};
-            if (beam.edge) p.fate = BeamFate::edge;
+            if (beam.edge) p.fate = BeamClass::edge;
             if (beam.edge || !is_set(hits.met, lane)) continue;
-            p.fate = BeamFate::met;
+            p.fate = BeamClass::met;
             p.surface_m = scale_ * hits.position[lane];
             p.normal = hits.geometric_normal[lane];
             p.distance_m = dot(p.normal, rays.direction[lane]) * (beam.range_m - scale_ * hits.range_m[lane]);
@@ -149,8 +149,8 @@ void BeamAssociation::find_edges(const Rigid3& T, const RangeNoise& noise) {
     }
 }
 
-/// Around the rim of each footprint, and halfway to it: a ray that leaves the plane of the axis's hit, or meets
-/// what the axis misses, shows an edge.
+/// Traces rays around the rim of each footprint and at half of its radius. A hit off the tangent plane of the
+/// axis's hit, or a hit where the axis misses (or vice versa), shows an edge.
 std::uint32_t BeamAssociation::meeting_edges(const RayBatch& axes, const HitBatch& met,
                                              const RangeNoise& noise) const {
     const double tangent = kWider * std::tan(0.5 * noise.footprint_rad);
@@ -200,21 +200,21 @@ void BeamAssociation::around_beams(const Rigid3& T, double search_m, std::size_t
             const Vec3 away = scale_ * (point - hits.position[lane]);
             if (!(dot(away, away) < nearest)) return;
             nearest = dot(away, away);
-            p.fate = BeamFate::met;
+            p.fate = BeamClass::met;
             p.surface_m = scale_ * hits.position[lane];
             p.normal = hits.geometric_normal[lane];
             p.distance_m = dot(p.normal, away);
         });
-        // Beside the model a tangent plane would let the point slide; the nearest place holds it.
-        if (nearest > 0 && p.fate == BeamFate::met && !is_set(hits.met, 0)) {
+        // Beside the model a tangent plane would not hold the point laterally: use the distance to the nearest hit.
+        if (nearest > 0 && p.fate == BeamClass::met && !is_set(hits.met, 0)) {
             p.distance_m = std::sqrt(nearest);
             p.normal = (scale_ * point - p.surface_m) / p.distance_m;
         }
     }
 }
 
-bool BeamAssociation::may_lie_elsewhere(const Rigid3& T, const RangeNoise& noise, double radius_m, std::size_t i,
-                                        const PointToPlane& p) const {
+bool BeamAssociation::may_be_on_other_surface(const Rigid3& T, const RangeNoise& noise, double radius_m,
+                                              std::size_t i, const PointToPlane& p) const {
     const Beam& beam = beams_[i];
     const Vec3 direction = conjugate(T.q) * beam.direction;
     HitBatch hits;
@@ -231,7 +231,8 @@ bool BeamAssociation::may_lie_elsewhere(const Rigid3& T, const RangeNoise& noise
 }
 
 Vector6 BeamAssociation::derivative(const Rigid3& T, std::size_t i, const PointToPlane& p) const {
-    // The surface goes with the target: a turn w and a shift d of the pose move it by turn (w x q s + d).
+    // The surface moves with the target: a rotation w and a translation d of the pose move it by turn (w x q s +
+    // d).
     const Vec3 turning = T.q * cross(p.surface_m, p.normal);
     const Vec3 normal = T.q * p.normal;
     const Vec3 shifting = turning_ ? beams_[i].turn * normal : normal;

@@ -13,28 +13,28 @@
 
 namespace narpa {
 
-enum class BeamFate : std::uint8_t {
+enum class BeamClass : std::uint8_t {
     met,      ///< the model's surface lies on the beam
     missed,   ///< the beam misses the model
     edge,     ///< a surface ends within its footprint (RangeNoise::footprint_rad)
     grazing,  ///< it meets the surface at too flat an angle for its range to be used
 };
 
-/// A point and the tangent plane that it should lie on, target coordinates.
+/// A point and the tangent plane on which it should lie, target coordinates.
 struct PointToPlane {
-    BeamFate fate = BeamFate::missed;
-    Vec3 surface_m{}, normal{};  ///< where the model was met; unit, towards the LiDAR
-    double distance_m = 0;       ///< of the measured point from the plane, along the normal
-    double sigma_m = 1;          ///< its standard deviation
+    BeamClass fate = BeamClass::missed;
+    Vec3 surface_m{}, normal{};  ///< hit on the model; unit normal, towards the LiDAR
+    double distance_m = 0;       ///< signed distance of the measured point from the plane, along the normal
+    double sigma_m = 1;          ///< standard deviation of distance_m
 };
 
-/// Number `k` of twelve rays about a beam: six around the rim of a cone of this tangent, or just outside it, and
-/// six halfway to it.
+/// Ray `k` of twelve about a beam: six on the rim of a cone with this tangent or just outside it, six at half of
+/// its radius.
 inline constexpr int kConeRays = 12;
 [[nodiscard]] Ray ray_in_cone(const Ray& beam, double tangent, int k) noexcept;
 
-/// Sorts beams so that those of like elevation and azimuth lie together: a spinning LiDAR's lasers fire by turns at
-/// elevations that are far apart.
+/// Sort key by which beams of similar elevation and azimuth are adjacent: a spinning LiDAR fires its lasers in an
+/// order that alternates between distant elevations.
 [[nodiscard]] float place_of(const Vec3& direction) noexcept;
 
 class BeamAssociation {
@@ -42,58 +42,59 @@ public:
     /// `tracer` outlives it. Only the body `target` is traced.
     BeamAssociation(const Tracer& tracer, std::size_t target);
 
-    /// Sets the sweep. Allocates only for more points than ever before.
+    /// Sets the sweep. Allocates only when the sweep has more points than all before.
     void take(std::span<const RangePoint> points, const ApparentMotion& motion);
     [[nodiscard]] std::size_t size() const noexcept { return beams_.size(); }
     /// The shortest range of the sweep.
     [[nodiscard]] double nearest_m() const noexcept { return nearest_m_; }
-    /// Of the target about its origin.
+    /// Bounding radius of the target about its origin.
     [[nodiscard]] double reach_m() const noexcept { return tracer_.bounding_radius_m(target_); }
 
-    /// The target is so many times as large as its model, from now on.
+    /// From now on the target is this many times as large as its model.
     void set_scale(double scale) noexcept { scale_ = scale; }
 
-    /// For every `stride`-th point from the first, in order, at this pose at the time of the sweep. With `search_m`
-    /// > 0, for poses that are far off, sixteen rays within that distance of the beam are traced and the hit
-    /// nearest to the point is used; a point whose beam misses is then attracted by the surface and its edges. Its
-    /// sigma_m is a quarter of `search_m` combined with the noise, so that all points within reach weigh alike.
+    /// Associates every `stride`-th point, starting with the first, in order, at this pose at the time of the
+    /// sweep. With `search_m` > 0, for poses with large errors, traces sixteen rays within that distance of the
+    /// beam and uses the hit nearest to the point, so that a point whose beam misses is attracted by the surface
+    /// and its edges. sigma_m is then a quarter of `search_m` combined with the range noise, so that all points in
+    /// the search radius have similar weights.
     void associate(const Rigid3& T_lidar_target, const RangeNoise& noise, double search_m, std::size_t stride,
                    std::vector<PointToPlane>& out) const;
 
-    /// Finds the points in whose footprint a surface ends at this pose; they are of BeamFate::edge until the next
-    /// call. Without a footprint there are none.
+    /// Finds the points with a surface edge in their footprint at this pose; they keep BeamClass::edge until the
+    /// next call. Finds none if the footprint is 0.
     void find_edges(const Rigid3& T_lidar_target, const RangeNoise& noise);
 
-    /// The point may as well lie on another surface that ends next to its beam: one that rays within `radius_m` of
-    /// it meet, turned by more than 30 degrees, and within three standard deviations of the point. `p`: of
-    /// associate() for point `i`.
-    [[nodiscard]] bool may_lie_elsewhere(const Rigid3& T_lidar_target, const RangeNoise& noise, double radius_m,
-                                         std::size_t i, const PointToPlane& p) const;
+    /// True if the point may equally lie on another surface next to its beam: a ray within `radius_m` of it hits a
+    /// surface that is turned by more than 30 degrees and passes within three standard deviations of the point.
+    /// `p`: result of associate() for point `i`.
+    [[nodiscard]] bool may_be_on_other_surface(const Rigid3& T_lidar_target, const RangeNoise& noise,
+                                               double radius_m, std::size_t i, const PointToPlane& p) const;
 
-    /// The derivative of distance_m with an error of the pose (pose_estimate.h), for point `i` of the sweep.
+    /// Derivative of distance_m by the error of the pose (pose_estimate.h), for point `i` of the sweep.
     [[nodiscard]] Vector6 derivative(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const;
 
-    /// The derivative of distance_m with the range, for the same point.
+    /// Derivative of distance_m by the range, for the same point.
     [[nodiscard]] double along_beam(const Rigid3& T_lidar_target, std::size_t i, const PointToPlane& p) const {
         return dot(p.normal, in_model(T_lidar_target, beams_[i]).direction);
     }
 
 private:
-    /// A beam relative to a target at rest: compensated for the target's motion since the time of the pose.
+    /// A beam relative to a stationary target: compensated for the target's motion since the time of the pose.
     struct Beam {
-        Quat turn{};               ///< of the target since then, LiDAR axes
-        Vec3 origin_m, direction;  ///< turned back
+        Quat turn{};               ///< rotation of the target since then, LiDAR axes
+        Vec3 origin_m, direction;  ///< rotated back
         double range_m = 0;
-        bool edge = false;  ///< find_edges
+        bool edge = false;  ///< set by find_edges
     };
-    /// In coordinates of the model, as long as the target's over the scale.
+    /// The beam in model coordinates, which are target coordinates divided by the scale.
     [[nodiscard]] Ray in_model(const Rigid3& T_lidar_target, const Beam& beam) const noexcept;
     void along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const;
     [[nodiscard]] std::uint32_t meeting_edges(const RayBatch& axes, const HitBatch& met,
                                               const RangeNoise& noise) const;
     void around_beams(const Rigid3& T, double search_m, std::size_t stride, std::vector<PointToPlane>& out) const;
-    /// Sixteen rays within `radius_m` of the beam at the point, the first through it. Returns the point; both in
-    /// coordinates of the model.
+    /// Traces sixteen rays within `radius_m` of the beam at the measured point, the first through it. Returns the
+    /// point, in model coordinates like the hits.
     Vec3 trace_around(const Rigid3& T, const Beam& beam, double radius_m, HitBatch& hits) const;
 
     const Tracer& tracer_;
@@ -102,7 +103,7 @@ private:
     bool turning_ = false;
     double scale_ = 1, nearest_m_ = 0;
     std::vector<Beam> beams_;
-    std::vector<std::pair<float, std::uint32_t>> order_;  ///< points, by neighbourhood
+    std::vector<std::pair<float, std::uint32_t>> order_;  ///< point indices, sorted by place_of
 };
 
 }  // namespace narpa

@@ -15,30 +15,30 @@ namespace narpa {
 namespace {
 
 constexpr std::size_t kFewestBeams = 6;
-constexpr std::size_t kSearchPoints = 100;  ///< of the sweep, about, that the search uses
+constexpr std::size_t kSearchPoints = 100;  ///< approximate number of the sweep's points that the search uses
 constexpr int kSearchIterations = 10;       ///< of the search, each with a smaller radius
 constexpr double kUnobservedBelow = 1e-3;   ///< normalised eigenvalue (observability.h)
-constexpr double kLastCircle = 0.02;        ///< of the search, in parts of the first
-constexpr double kExplained = 4;            ///< standard deviations of a point that lies on the model
+constexpr double kLastCircle = 0.02;        ///< last search radius over the first
+constexpr double kExplained = 4;            ///< standard deviations within which a point lies on the model
 constexpr double kOutlierCost = 0.5 * kExplained * kExplained, kUsualCost = 0.5;
-/// Answers may have rivals below so many points, where a normalised eigenvalue is smaller, where a larger part of
-/// the points lies elsewhere, or where the cost is so many standard deviations above that of noise.
+/// An estimate may have rivals if it has fewer points, a smaller normalised eigenvalue, a larger part of points off
+/// the model, or a cost this many standard deviations above that of noise.
 constexpr std::size_t kManyPoints = 150;
 constexpr double kWeak = 0.01, kFewElsewhere = 0.02, kMoreThanNoise_sigmas = 4;
-/// Rivals are looked for about the best of them, and so on, at most so many times.
+/// Rivals are searched about the best of them, repeatedly, at most this many times.
 constexpr int kCompetitions = 4;
-/// A rival is better by this difference of the costs, each half a chi-square.
+/// A rival is better if its cost (half a chi-square) is smaller by at least this.
 constexpr double kBetter = 0.5;
-/// Of a search about a minimum at which points lie beside the model, in parts of the points' spread.
+/// Radius of a repeated search about a minimum with points beside the model, over the points' RMS radius.
 constexpr double kBesideCircle = 0.15;
-/// Other surfaces are looked for so near to a beam, in standard deviations of the range.
+/// Radius about a beam in which other surfaces are searched, in standard deviations of the range.
 constexpr double kElsewhere_sigmas = 2;
-/// Of the search: further from the guess than so many times its reach is a symmetry of the target, or another
-/// target.
+/// An answer further from the guess than this many times the search radius is a symmetric pose of the target, or
+/// another target.
 constexpr double kSearched = 2.5;
 
-/// So many of n points would be found with a chance below 5 % if their share were `least` (Clopper and Pearson
-/// 1934): of few points nearly all must be.
+/// True if `found` or more of n points would occur with a chance below 5 % if the true share were `least` (exact
+/// binomial test: Clopper and Pearson 1934). With few points nearly all must be found.
 bool share_is_more(std::size_t found, std::size_t n, double least) {
     if (static_cast<double>(found) < least * static_cast<double>(n)) return false;
     if (!(least > 0) || least >= 1) return true;
@@ -51,20 +51,21 @@ bool share_is_more(std::size_t found, std::size_t n, double least) {
     return sum < 0.05;
 }
 
-/// At most, of surfaces within `reach_m` of the target's origin.
+/// Upper bound of the motion of surfaces within `reach_m` of the target's origin.
 double surface_motion_m(const Vector6& pose_step, double reach_m) {
     return pose_step.tail<3>().norm() + pose_step.head<3>().norm() * reach_m;
 }
 
-/// Along an observed motion more than the part kMost of the information is from points that are not in `some`.
+/// True if, along some observed motion, more than the part kMax of the information comes from points not in
+/// `some`.
 bool rests_on_the_rest(const CheckedInformation& all, const CheckedInformation& some) {
-    constexpr double kMost = 0.75;
+    constexpr double kMax = 0.75;
     const Observability& o = all.observability;
     if (o.unobserved == 6 || some.observability.unobserved > o.unobserved) return o.unobserved < 6;
     const Matrix6 L = cholesky(o.along_motions(all.information)).L;
     const Matrix6 half = lower_solve(L, o.along_motions(some.information));
-    const Matrix6 parts = lower_solve(L, Matrix6(half.transpose()));  // L^-1 some L'^-1; 1 of unobserved motions
-    return !(symmetric_eigen(parts).values[0] > 1 - kMost);
+    const Matrix6 parts = lower_solve(L, Matrix6(half.transpose()));  // L^-1 some L'^-1; 1 along unobserved motions
+    return !(symmetric_eigen(parts).values[0] > 1 - kMax);
 }
 
 template <class Beam>
@@ -98,7 +99,7 @@ Status check_start(const Rigid3& T) {
 
 }  // namespace
 
-/// Covariance, bound and root of the information. `information`: what the answer may rest on.
+/// Sets covariance, bound and root information. `information`: that of the points the answer may rest on.
 void CloudIcp::weigh(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const {
     const double factor = equations.variance_factor();
     const Observability& o = out.observability;
@@ -111,7 +112,7 @@ void CloudIcp::weigh(const PlaneEquations& equations, const Matrix6& information
     out.root_information = root_information_with(o.root_information(information, factor), by_model);
 }
 
-/// The answer may rest only on points that others check; nor may it rest on points that may lie on another surface.
+/// The answer may rest only on points that are checked by others and cannot lie on another surface.
 void CloudIcp::verify(CloudEstimate& out) {
     const Rigid3& T = out.T_lidar_target;
     association_.set_scale(1 + out.scale);
@@ -121,8 +122,8 @@ void CloudIcp::verify(CloudEstimate& out) {
     CheckedInformation checked = checked_information(rows_, equations->spread(), kUnobservedBelow);
     const double radius_m = kElsewhere_sigmas * settings_.noise.range_m;
     for (WeightedRow& row : rows_)
-        row.checked = !association_.may_lie_elsewhere(T, settings_.noise, radius_m, row.measurement,
-                                                      planes_[row.measurement]);
+        row.checked = !association_.may_be_on_other_surface(T, settings_.noise, radius_m, row.measurement,
+                                                            planes_[row.measurement]);
     const CheckedInformation on_one = checked_information(rows_, equations->spread(), kUnobservedBelow);
     if (rests_on_the_rest(checked, on_one)) checked = on_one;
     out.unchecked = checked.unchecked;
@@ -137,7 +138,7 @@ std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search
     magnitudes_.clear();
     rows_.clear();
     for (const PointToPlane& p : planes_)
-        if (p.fate == BeamFate::met) magnitudes_.push_back(std::abs(p.distance_m) / p.sigma_m);
+        if (p.fate == BeamClass::met) magnitudes_.push_back(std::abs(p.distance_m) / p.sigma_m);
     out.points = planes_.size();
     out.used = out.missed = out.edges = out.grazing = out.rejected = out.explained = 0;
     out.cost = 0;
@@ -145,12 +146,12 @@ std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search
     PlaneEquations equations(std::max(1.0, kMadToSigma * upper_median(std::span(magnitudes_))));
     for (std::size_t k = 0; k < planes_.size(); ++k) {
         const PointToPlane& p = planes_[k];
-        out.missed += p.fate == BeamFate::missed;
-        out.grazing += p.fate == BeamFate::grazing;
-        out.edges += p.fate == BeamFate::edge;
-        if (p.fate == BeamFate::missed) out.cost += kOutlierCost;
-        if (p.fate == BeamFate::edge) out.cost += kUsualCost;
-        if (p.fate != BeamFate::met) continue;
+        out.missed += p.fate == BeamClass::missed;
+        out.grazing += p.fate == BeamClass::grazing;
+        out.edges += p.fate == BeamClass::edge;
+        if (p.fate == BeamClass::missed) out.cost += kOutlierCost;
+        if (p.fate == BeamClass::edge) out.cost += kUsualCost;
+        if (p.fate != BeamClass::met) continue;
         const double e = p.distance_m / p.sigma_m;
         out.explained += std::abs(e) < kExplained;
         out.cost += std::min(0.5 * e * e, kOutlierCost);
@@ -194,7 +195,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
     Rigid3& T = out.T_lidar_target;
     T = search_m > 0 ? search(start, search_m, points, circles, out) : start;
     Vector6 last = Vector6::Zero();
-    double damping = 1, moved_m = 0;  // since edges were found
+    double damping = 1, moved_m = 0;  // moved_m: motion since edges were found
     for (int i = 0;; ++i) {
         if (i == 0 || (out.settled && moved_m > edges_hold_m() && i < settings_.iterations)) {
             association_.set_scale(1 + out.scale);
@@ -211,7 +212,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         auto [step, larger] = equations->step(out.observability);
         out.scale += larger;
         const Matrix6& hessian = equations->hessian();
-        // Back and forth between two sets of partners, for ever: it ends between them.
+        // Steps that alternate between two sets of correspondences: damp them, to end between the two.
         if (step.dot(hessian * last) < 0) damping *= 0.5;
         step *= damping;
         T = displaced(T, step);
@@ -220,20 +221,19 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         out.settled = step.dot(hessian * step) < std::pow(settings_.settled * equations->scatter(), 2);
         last = step;
     }
-    out.on_model = share_is_more(out.explained, out.points - out.edges, settings_.explained_least);
+    out.on_model = share_is_more(out.explained, out.points - out.edges, settings_.min_inlier_share);
     return out;
 }
 
-/// Largest motion of the surfaces for which the edges that were found stay valid: the rim that is searched is wider
-/// by as much.
+/// Largest motion of the surfaces for which the edges found stay valid: the searched cone is wider by as much.
 double CloudIcp::edges_hold_m() const {
     if (!(settings_.noise.footprint_rad > 0)) return kInfinity;
     return 0.05 * settings_.noise.footprint_rad * association_.nearest_m();
 }
 
-/// Beams that miss the model have no residual, so a face can stop short of its edge. Repeats the search about the
-/// minimum, so that they find a surface.
-void CloudIcp::draw_in(CloudEstimate& found) {
+/// Beams that miss the model have no residual, so the fit may leave a face short of its edge. Repeats the search
+/// about the minimum, so that these beams find a surface.
+void CloudIcp::refit_missed_beams(CloudEstimate& found) {
     for (int i = 0; i < 3; ++i) {
         if (found.used < kFewestBeams || found.explained + found.grazing + found.edges >= found.points) return;
         CloudEstimate again =
@@ -244,21 +244,21 @@ void CloudIcp::draw_in(CloudEstimate& found) {
     }
 }
 
-/// An answer of few points, with a motion that they hold weakly, with points that lie elsewhere, or with larger
-/// residuals than noise makes.
+/// True for an estimate with few points, a weakly observed motion, points off the model, or larger residuals than
+/// noise explains.
 bool CloudIcp::may_have_rivals(const CloudEstimate& e) {
     const Observability& o = e.observability;
     const auto elsewhere = static_cast<double>(e.points - e.explained - e.grazing - e.edges);
-    // Half of a chi-square, whose standard deviation is the root of its mean.
+    // Half of a chi-square; its standard deviation is the square root of its mean.
     const double of_noise = 0.5 * static_cast<double>(e.points - e.edges);
     return e.used < kManyPoints || o.eigenvalues[o.unobserved] < kWeak ||
            elsewhere > kFewElsewhere * static_cast<double>(e.points) ||
            e.cost > of_noise + kMoreThanNoise_sigmas * std::sqrt(of_noise);
 }
 
-/// Looks for other minima that are as good: from poses that lie a search away along the two motions that the points
-/// hold least. The best is the answer; it is ambiguous where another is nearly as likely. True where one is better:
-/// about that there may be better ones still.
+/// Looks for equally good minima, starting at poses one search radius away along the two least observed motions.
+/// Keeps the best; another that is nearly as likely becomes a rival. True if a better one was found: the caller
+/// then repeats this about it, as still better ones may exist.
 bool CloudIcp::compete(CloudEstimate& found, double search_m) {
     if (found.used < kFewestBeams || found.observability.unobserved > 4 || !may_have_rivals(found)) return false;
     const CloudEstimate first = found;
@@ -266,22 +266,22 @@ bool CloudIcp::compete(CloudEstimate& found, double search_m) {
         for (const double side : {-search_m, search_m}) {
             const Rigid3 start = displaced(first.T_lidar_target, side * first.observability.motions.col(motion));
             CloudEstimate rival = attempt(start, search_m, 2 * kSearchPoints, kSearchIterations);
-            draw_in(rival);
+            refit_missed_beams(rival);
             found.iterations += rival.iterations;
             if (!rival.settled || rival.used < kFewestBeams) continue;
             const bool better = rival.cost < found.cost - kBetter;
             const Matrix6& root = better ? rival.root_information : found.root_information;
             const Vector6 apart = error_between(found.T_lidar_target, rival.T_lidar_target);
-            const bool elsewhere = (root * apart).squaredNorm() > kElsewhere;
+            const bool elsewhere = (root * apart).squaredNorm() > kDistinctPose_chi2;
             const double worse_chi2 = 2 * std::abs(rival.cost - found.cost);
-            if (!better && !(elsewhere && worse_chi2 < kAsLikely)) continue;
+            if (!better && !(elsewhere && worse_chi2 < kRival_chi2)) continue;
             if (empty_beams_.count(rival.T_lidar_target, rival.covariance).refutes()) continue;
             if (better) {
                 rival.iterations = found.iterations;
                 std::swap(rival, found);
                 if (!elsewhere) found.rivals = std::move(rival.rivals);
             }
-            if (elsewhere && worse_chi2 < kAsLikely) found.rivals.push_back({rival.T_lidar_target, worse_chi2});
+            if (elsewhere && worse_chi2 < kRival_chi2) found.rivals.push_back({rival.T_lidar_target, worse_chi2});
         }
     return found.cost < first.cost - kBetter;
 }
@@ -334,7 +334,7 @@ CloudIcp::Approach CloudIcp::approach(const Rigid3& start, double search_m) {
         double met = 0;
         for (std::size_t k = 0; k < planes_.size(); ++k) {
             seen_m = seen_m + points_[k * stride].position_m();
-            if (planes_[k].fate == BeamFate::missed) continue;
+            if (planes_[k].fate == BeamClass::missed) continue;
             met_m = met_m + T * planes_[k].surface_m;
             ++met;
         }
@@ -359,7 +359,7 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
         again.iterations += out.iterations;
         if (again.explained > out.explained) out = again;
     }
-    draw_in(out);
+    refit_missed_beams(out);
     if (search_m > 0)
         for (int k = 0; k < kCompetitions && compete(out, search_m); ++k) {
         }

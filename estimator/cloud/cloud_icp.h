@@ -2,9 +2,10 @@
 ///
 /// Each beam is traced into the model at the current pose; the hit is the correspondence, and the measured point
 /// should lie on the tangent plane there (Y. Chen, G. Medioni, "Object modelling by registration of multiple range
-/// images", 1992; correspondences along the line of sight: G. Blais, M. Levine, 1995). Robustly weighted
-/// Gauss-Newton: first on few points with correspondences searched around each beam, within decreasing radii; then
-/// on all along their beams. Unobservable motions stay as in the start and are reported (observability.h).
+/// images", 1992; correspondences along the line of sight: G. Blais, M. Levine, 1995). Solved by robustly weighted
+/// Gauss-Newton: first on few points, with correspondences searched around each beam within decreasing radii; then
+/// on all points, along their beams. Unobservable motions keep their start value and are reported
+/// (observability.h).
 #pragma once
 
 #include <optional>
@@ -23,47 +24,48 @@ namespace narpa {
 
 struct IcpSettings {
     RangeNoise noise{};
-    CertainReturn certain{};  ///< for beams without return; nowhere: they are not looked at
+    CertainReturn certain{};  ///< for beams without return; default: these are ignored
     int iterations = 50;      ///< at most, after the search
-    double settled = 0.05;    ///< converged: a step of fewer standard deviations; 0: all iterations
-    /// Least part of the points on the model at a right pose, with a confidence of 95 %: fewer mean a false
-    /// minimum, or too few points to tell (29, all on the model, are enough for 0.9). The search is then repeated
-    /// with four times the points.
-    double explained_least = 0.9;
+    double settled = 0.05;  ///< converged: a step shorter than this, in standard deviations; 0: run all iterations
+    /// Least share of points on the model at a correct pose, tested at 95 % confidence: a smaller share means a
+    /// false minimum, or too few points to decide (29 points, all on the model, suffice for 0.9). The search is
+    /// then repeated with four times as many points.
+    double min_inlier_share = 0.9;
     ModelUncertainty model{};
 };
 
 struct CloudEstimate {
     Rigid3 T_lidar_target{};
-    /// Of the pose's error (pose_estimate.h): of the robust estimate (P. Huber, Robust Statistics, 1981,
-    /// section 7.6), for the residuals' own scatter, at least that of the noise, and of the model's uncertainty.
+    /// Covariance of the pose's error (pose_estimate.h): of the robust estimate (P. Huber, Robust Statistics, 1981,
+    /// section 7.6), scaled by the residuals' own scatter or the configured noise, whichever is larger, plus that
+    /// of the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
-    Matrix6 covariance_of_model = Matrix6::Zero();  ///< the last part, which is the same in all sweeps
-    /// Of the covariance, for filters: rows of zeros for motions that are not observed (root_information.h).
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< part of the model's uncertainty, common to all sweeps
+    /// Root of the inverse covariance, for filters: zero rows for unobserved motions (root_information.h).
     Matrix6 root_information = Matrix6::Zero();
-    /// Cramer-Rao bound for the points used and the noise of the settings, and the model's uncertainty.
+    /// Cramer-Rao bound of the points used at the configured noise, plus the model's uncertainty.
     Matrix6 bound = Matrix6::Zero();
     Observability observability{};
-    double scale = 0;      ///< by this part the target is larger than its model, if ModelUncertainty::scale is told
-    int iterations = 0;    ///< with those of the search
-    bool settled = false;  ///< the last step was small
-    bool on_model = false;  ///< enough points are explained
+    double scale = 0;       ///< relative excess of the target's size over its model's, with ModelUncertainty::scale
+    int iterations = 0;     ///< including those of the search
+    bool settled = false;   ///< the last step was small
+    bool on_model = false;  ///< the share of explained points is sufficient
     /// Other poses that explain the points nearly as well: a near symmetry of the model, or few points.
     std::vector<Rival> rivals;
     Answer answer;
-    /// The first is the sum of the others.
+    /// points is the sum of the others.
     std::size_t points = 0, used = 0, missed = 0, edges = 0, grazing = 0, rejected = 0;
-    /// Of the points used: they count for the pose, not for what it is worth. They hold a motion alone, or two of
-    /// them, so that an error would not show (leverage.h); or a motion rests on points that may lie on another
-    /// surface, which begins within two standard deviations of the range.
+    /// Number of used points that contribute to the pose but not to its covariance. Either they hold one or two
+    /// motions alone, so that an error would not show (leverage.h); or a motion rests on points that may lie on
+    /// another surface within two standard deviations of the range.
     int unchecked = 0;
     /// Points within four standard deviations of the noise from the model.
     std::size_t explained = 0;
     EmptyBeamCount empty_beams;
-    /// Minus the logarithm of the likelihood, of normal noise and outliers beyond four standard deviations: half
-    /// the sum of the points' squared distances in standard deviations, at most 8 each.
+    /// Negative log-likelihood for normal noise with outliers beyond four standard deviations: half the sum of the
+    /// points' squared distances in standard deviations, at most 8 each.
     double cost = 0;
-    double radius_m = 0;  ///< of the points used about their centre, root mean square
+    double radius_m = 0;  ///< RMS distance of the points used from their centre
 };
 
 class CloudIcp {
@@ -74,22 +76,23 @@ public:
           association_(tracer, target),
           empty_beams_(tracer, target, settings.noise, settings.certain) {}
 
-    /// `search_m`: bound of the error of surfaces at the start, about distance * angle + shift; 0: no search around
-    /// the beams. An answer that is observed in all motions and further from the start than 2.5 times that is
-    /// refused, and one that `empty`, the sweep's beams without return, refute. Errors: a point that is not finite
-    /// or not a range along a unit direction, a motion, a start or a search that is not finite, or fewer than six
-    /// beams that meet the model. Allocates only for more points than ever before, or an Error.
+    /// `search_m`: bound of the initial error of surface positions, about distance * angle + shift; 0: no search
+    /// around the beams. Refuses an answer that is fully observed but further from the start than 2.5 times
+    /// `search_m`, and one that the sweep's beams without return, `empty`, refute. Errors: non-finite input, a
+    /// range that is not positive, a direction that is not of unit length, or fewer than six beams that meet the
+    /// model. Allocates only when the sweep has more points than all before, or for an Error.
     [[nodiscard]] Result<CloudEstimate> align(std::span<const RangePoint> points, const ApparentMotion& motion,
                                               const Rigid3& start, double search_m = 0,
                                               std::span<const EmptyBeam> empty = {});
 
-    /// For searches: where few points lead from an attitude, within circles that begin with `search_m`, and what
-    /// they cost there (CloudEstimate::cost). The target is first moved to where its surface is as the points'.
+    /// For searches: the pose to which few points lead from an attitude, with search radii that start at
+    /// `search_m`, and its cost (CloudEstimate::cost). The target is first shifted so that its surface is centred
+    /// on the points.
     struct Approach {
         Rigid3 T_lidar_target{};
         double cost = 0;
     };
-    /// Of the sweep that align() or begin() had last.
+    /// Uses the sweep given to align() or begin() last.
     [[nodiscard]] Approach approach(const Rigid3& start, double search_m);
     /// Checks and sets the sweep; the spans outlive its use.
     [[nodiscard]] Status begin(std::span<const RangePoint> points, const ApparentMotion& motion,
@@ -99,12 +102,12 @@ private:
     [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start, double search_m) const;
     void weigh(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const;
     void verify(CloudEstimate& out);
-    /// At this pose; nothing where too few points meet the model to solve for one.
+    /// Normal equations at this pose; empty if too few points meet the model.
     [[nodiscard]] std::optional<PlaneEquations> linearise(const Rigid3& T, double search_m, std::size_t stride,
                                                           CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
     [[nodiscard]] double edges_hold_m() const;
-    void draw_in(CloudEstimate& found);
+    void refit_missed_beams(CloudEstimate& found);
     [[nodiscard]] static bool may_have_rivals(const CloudEstimate& e);
     bool compete(CloudEstimate& found, double search_m);
     [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int circles,

@@ -10,8 +10,8 @@ namespace narpa {
 namespace {
 
 constexpr double kInsideSigmas = 5;
-constexpr float kSteepEnough = 0.342F;  ///< of 70 degrees
-/// Fewer never refute a pose: 3 in one stretch take 245 that have a return.
+constexpr float kSteepEnough = 0.342F;  ///< cosine of 70 degrees
+/// Fewer never refute a pose: even 3 in one stretch need 245 beams with a return.
 constexpr std::size_t kFewestEmpty = 3;
 
 double log_choose(double n, double k) {
@@ -49,7 +49,7 @@ EmptyBeamCount EmptyBeams::count(const Rigid3& T, const Matrix6& covariance) {
     if (out.empty < kFewestEmpty) return out;
     find_inside(at, points_, false);
     std::ranges::sort(inside_);
-    // A beam with two echoes is one.
+    // Count a beam with two echoes once.
     inside_.erase(std::unique(inside_.begin(), inside_.end()), inside_.end());
     out.empty = static_cast<std::size_t>(std::ranges::count(inside_, true, &std::pair<float, bool>::second));
     out.returned = inside_.size() - out.empty;
@@ -59,7 +59,7 @@ EmptyBeamCount EmptyBeams::count(const Rigid3& T, const Matrix6& covariance) {
     return out;
 }
 
-/// Appends those of the beams that meet the model well inside.
+/// Appends those beams that meet the model well inside its outline.
 template <class Beam>
 void EmptyBeams::find_inside(const At& at, std::span<const Beam> beams, bool empty) {
     const double reach2 = std::pow(tracer_.bounding_radius_m(target_), 2);
@@ -81,7 +81,7 @@ void EmptyBeams::find_inside(const At& at, std::span<const Beam> beams, bool emp
     if (rays.n > 0) trace();
 }
 
-/// Those that meet a surface which certainly has a return, and where.
+/// Returns the mask of rays that meet a surface which certainly has a return, and their ranges.
 std::uint32_t EmptyBeams::certain(const RayBatch& rays, Lanes<double>& range_m) const noexcept {
     Lanes<LidarReturn> returns{};
     shoot(tracer_, at_rest_, rays, {.range_max_m = certain_.farthest_m, .bodies = {&target_, 1}}, returns);
@@ -90,7 +90,7 @@ std::uint32_t EmptyBeams::certain(const RayBatch& rays, Lanes<double>& range_m) 
         const LidarReturn& r = returns[lane];
         range_m[lane] = r.range_m;
         const double light = static_cast<double>(r.reflectivity) / (r.range_m * r.range_m);
-        if (r.range_m > certain_.nearest_m && r.cos_incidence > kSteepEnough && light > certain_.least_light_1_m2)
+        if (r.range_m > certain_.nearest_m && r.cos_incidence > kSteepEnough && light > certain_.min_light_1_m2)
             out |= 1u << lane;
     }
     return out;
@@ -101,7 +101,8 @@ std::uint32_t EmptyBeams::well_inside(const At& at, const RayBatch& axes) const 
     Lanes<double> tangent{};
     std::uint32_t inside = certain(axes, range_m);
     for_each_lane(inside, [&](std::size_t lane) {
-        // How an error of the pose moves the surface (pose_estimate.h), in target axes; across the beam it counts.
+        // Motion of the surface by an error of the pose (pose_estimate.h), in target axes; only the part across the
+        // beam matters.
         const Vec3 d = axes.direction[lane], s = axes.origin[lane] + range_m[lane] * d;
         Eigen::Matrix<double, 3, 6> J;
         J << -skew(to_eigen(at.T.q * s)), Eigen::Matrix3d::Identity();

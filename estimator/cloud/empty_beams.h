@@ -1,12 +1,12 @@
-/// estimator/cloud/empty_beams.h - what the beams that brought no return say of a pose.
+/// estimator/cloud/empty_beams.h - tests a pose by the beams that brought no return.
 ///
-/// A beam that passes through the model where a surface certainly has a return speaks against the pose. A LiDAR
-/// also loses returns by chance, and the estimator does not know how many: those lie anywhere among the others,
-/// while a pose that is wrong has whole stretches of empty beams where its model has surfaces and the target has
-/// none. So the beams that meet the model well inside of its outline, with return and without, are put in order
-/// along the scan, and the stretches of empty ones are counted. That so many empty beams fall into so few stretches
-/// by chance has a probability that does not depend on how many are lost (W. Stevens, "Distribution of groups in a
-/// sequence of alternatives", Annals of Eugenics 9, 1939).
+/// A beam without return that passes through the model where a surface certainly has a return is evidence against
+/// the pose. A LiDAR also loses returns by chance, at a rate unknown to the estimator. Lost returns are scattered
+/// at random among the others, while a wrong pose makes whole stretches of empty beams, where the model has
+/// surfaces and the target has none. So the beams that meet the model well inside its outline, with and without
+/// return, are ordered along the scan, and the stretches of empty ones are counted. The probability that so many
+/// empty beams fall into so few stretches by chance does not depend on the loss rate (W. Stevens, "Distribution of
+/// groups in a sequence of alternatives", Annals of Eugenics 9, 1939).
 #pragma once
 
 #include <span>
@@ -20,17 +20,18 @@
 
 namespace narpa {
 
-/// Of the beams that meet the model well inside.
+/// Counts over the beams that meet the model well inside its outline.
 struct EmptyBeamCount {
     std::size_t empty = 0, returned = 0;
-    std::size_t stretches = 0;  ///< of empty ones
-    double chance = 1;          ///< of so few stretches or fewer
+    std::size_t stretches = 0;  ///< runs of consecutive empty beams
+    double chance = 1;          ///< probability of so few stretches or fewer
 
-    /// By chance in one of 10,000 poses that are right.
+    /// A correct pose is refuted by chance in one of 10,000 cases.
     [[nodiscard]] bool refutes() const noexcept { return chance < 1e-4; }
 };
 
-/// Of `empty` beams among `returned` ones in so many stretches or fewer, all orders being equally likely.
+/// Probability that `empty` beams among `returned` ones form so many stretches or fewer, all orders being equally
+/// likely.
 [[nodiscard]] double chance_of_stretches(std::size_t empty, std::size_t returned, std::size_t stretches);
 
 class EmptyBeams {
@@ -43,12 +44,12 @@ public:
           noise_(noise),
           certain_(certain) {}
 
-    /// Sets the sweep; the spans outlive its use. Allocates only for more beams than ever before.
+    /// Sets the sweep; the spans outlive its use. Allocates only when it has more beams than all sweeps before.
     void take(std::span<const RangePoint> points, std::span<const EmptyBeam> empty, const ApparentMotion& motion);
 
-    /// At this pose at the time of the sweep. Well inside: everywhere within five standard deviations of the pose's
-    /// error, of pointing, and the beam's own width the model has a return that is certain, at most 70 degrees off
-    /// the surface's normal.
+    /// At this pose at the time of the sweep. A beam is well inside the outline if the model has a certain return,
+    /// at most 70 degrees off the surface's normal, everywhere within the beam's own width plus five standard
+    /// deviations of the pose's error and of pointing.
     [[nodiscard]] EmptyBeamCount count(const Rigid3& T_lidar_target, const Matrix6& covariance);
 
 private:
@@ -66,7 +67,7 @@ private:
     ApparentMotion motion_{};
     std::span<const RangePoint> points_;
     std::span<const EmptyBeam> empty_;
-    std::vector<std::pair<float, bool>> inside_;  ///< place in the scan; whether it is empty
+    std::vector<std::pair<float, bool>> inside_;  ///< sort key of place_of; whether the beam is empty
 };
 
 }  // namespace narpa

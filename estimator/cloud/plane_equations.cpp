@@ -6,9 +6,9 @@
 namespace narpa {
 namespace {
 
-constexpr double kTukey = 4.685;  // of the biweight: 95 % of the efficiency of least squares
+constexpr double kTukey = 4.685;  // tuning constant of the biweight: 95 % of the efficiency of least squares
 
-/// Of Tukey's biweight at u standard deviations: weight psi(u) / u, and psi'(u).
+/// Tukey's biweight at u standard deviations: weight psi(u) / u, and slope psi'(u).
 struct Biweight {
     double weight = 0, slope = 0;
     explicit Biweight(double u) {

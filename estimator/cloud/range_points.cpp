@@ -6,8 +6,8 @@
 
 namespace narpa {
 
-/// Of the mean of a few rays over a beam: the distance of their centre from the axis, on each of two axes, in parts
-/// of the beam's angle. Eight rays; 32 have 0.006.
+/// Distance of the centroid of a beam's few sample rays from its axis, per axis, as a part of the beam's angle. For
+/// eight rays; 32 have 0.006.
 constexpr double kFootprintCentre = 0.02;
 
 RangeNoise range_noise_of(const Lidar& lidar) {
@@ -23,7 +23,7 @@ RangeNoise range_noise_of(const Lidar& lidar) {
 
 CertainReturn certain_return_of(const Lidar& lidar, const Scene& scene) {
     if (scene.atmosphere) return {};
-    /// The materials are right to this factor; echoes are above the limit by so many standard deviations.
+    /// kMaterials: uncertainty factor of the materials; kSigmas: margin of an echo above the detection limit.
     constexpr double kMaterials = 3, kSigmas = 4;
     const LidarReceiverModel& r = lidar.receiver;
     const bool stated = r.range_at_10_percent_m > 0;

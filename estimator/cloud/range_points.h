@@ -23,7 +23,7 @@ struct RangePoint {
     [[nodiscard]] Vec3 position_m() const { return origin_m + range_m * direction; }
 };
 
-/// A beam as it was fired, which brought no return.
+/// A fired beam without return.
 struct EmptyBeam {
     Vec3 origin_m{}, direction{};  ///< as RangePoint
     double t_s = 0;
@@ -31,33 +31,33 @@ struct EmptyBeam {
 
 struct LidarSweep {
     std::vector<RangePoint> points;
-    std::vector<EmptyBeam> empty;  ///< where the packets state them
+    std::vector<EmptyBeam> empty;  ///< only from packets that report them
 
     void clear() { points.clear(), empty.clear(); }
 };
 
-/// Standard deviations of a return. Seen along the normal of a surface that the beam meets at the angle i from it,
-/// a point is off by sqrt((range cos i)^2 + (distance * pointing * sin i)^2): what pointing and the width of the
-/// footprint do to the range grows as tan i.
+/// Standard deviations of a return. With the angle of incidence i, the error along the surface's normal is
+/// sqrt((range cos i)^2 + (distance * pointing * sin i)^2): the effect of pointing and footprint width on the range
+/// grows as tan i.
 struct RangeNoise {
     double range_m = 0.02;         ///< including the rounding in the packet: resolution / sqrt(12)
     double pointing_rad = 5.1e-5;  ///< of the beam's direction: an azimuth rounded to 0.01 deg
-    /// Full angle of the beam. Where a surface ends within it, the range is that of the part that meets it, or a
-    /// mean of two surfaces: such points are left out. 0: a line.
+    /// Full angle of the beam. Where a surface ends within it, the range is that of the part hit, or a mean of two
+    /// surfaces: such points are left out. 0: an ideal line.
     double footprint_rad = 0;
 };
 
-/// Of a LiDAR's returns as its scene models them; where it models no noise, the values above.
+/// Noise of a LiDAR's returns as its scene models it; where the scene models none, the defaults above.
 [[nodiscard]] RangeNoise range_noise_of(const Lidar& lidar);
 
-/// Where a surface of the model certainly has a return, unless the LiDAR loses it by chance.
+/// Limits within which a surface of the model certainly has a return, unless the LiDAR loses it by chance.
 struct CertainReturn {
-    double nearest_m = 0, farthest_m = 0;  ///< nowhere where they are equal
-    double least_light_1_m2 = 0;           ///< reflectivity / range^2 along the beam (renderer/lidar/lidar_shot.h)
+    double nearest_m = 0, farthest_m = 0;  ///< equal: nowhere
+    double min_light_1_m2 = 0;             ///< reflectivity / range^2 along the beam (renderer/lidar/lidar_shot.h)
 };
 
-/// For surfaces that reflect a third of what the scene's materials do. Where the scene states no detection limit: a
-/// surface of 10 % at half of the largest range. Nowhere in air, which takes an unknown part.
+/// For surfaces that reflect a third of what the scene's materials do. If the scene states no detection limit: that
+/// of a surface of 10 % at half of the largest range. Nowhere in an atmosphere, whose absorption is unknown.
 [[nodiscard]] CertainReturn certain_return_of(const Lidar& lidar, const Scene& scene);
 
 /// Decodes packets of one unit into sweeps.
@@ -66,8 +66,8 @@ public:
     explicit SweepReader(const LidarModel& unit)
         : unit_(unit), points_(unit.spec().points_per_packet), empty_(unit.spec().shots_per_packet) {}
 
-    /// Appends what a data packet states. `packet_after_ns`: time of the packet's first shot after the time of the
-    /// pose.
+    /// Appends the content of a data packet. `packet_after_ns`: time of the packet's first shot minus the time of
+    /// the pose.
     void append(std::span<const std::uint8_t> packet, std::int64_t packet_after_ns, LidarSweep& out);
 
 private:

@@ -115,7 +115,7 @@ void BorderPoints::find_shifts(const FineGrid& grid) {
     }
 }
 
-/// Each point stands for the way to the middle between it and the next.
+/// A point represents the line halfway to its neighbours.
 void BorderPoints::add_shift(const Step& step, const EdgePlace& edge) {
     const RaySample *a = &step.lines->points[step.first], *b = a + 1;
     const double change = (edge.along - 0.5) * (a->signal - b->signal);

@@ -13,33 +13,33 @@
 
 namespace narpa {
 
-/// Row-major.
+/// Index in a row-major array.
 inline std::size_t index_in(int width, int x, int y) {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
 /// A camera with fineness x fineness pixels for each pixel of another.
 struct FineGrid {
-    /// `path`: while the fine grid's rows are exposed. `render_scene` and `at` outlive it.
+    /// `path`: camera path for the fine grid's rows. `render_scene` and `at` outlive it.
     FineGrid(const RenderScene& render_scene, const BodyPoses& at, const Camera& pixels, const CameraPose& path,
              const FrameSettings& for_all, int factor);
     FineGrid(const FineGrid&) = delete;
     FineGrid& operator=(const FineGrid&) = delete;
 
     const int fineness;
-    /// Of the search for a contour (bisect). The range of a smooth body's limb needs eight; where few lines make
-    /// the derivative coarse, fewer lead to the same steps and the same choice of pixels.
+    /// Bisection steps of the search for a contour. The range of a smooth body's limb needs eight; if few lines
+    /// make the derivative coarse, fewer lead to the same steps of the pose and the same choice of pixels.
     const int halvings = std::min(2 * fineness, 8);
     const Camera camera;
     const FrameSettings settings;
     const Frame frame;
 };
 
-/// Traces rays through any points of a grid, to the centre of the Sun from there.
+/// Traces rays through arbitrary points of a grid; lit by the centre of the Sun.
 class PointTracer {
 public:
     PointTracer(const FineGrid& grid, const SensorModel& sensor);
-    /// `seen` is written by the next `trace`, if not before.
+    /// `seen` is written by the next `trace` at the latest.
     void put(double x, double y, RaySample& seen);
     void trace();
 
@@ -53,19 +53,19 @@ private:
     Lanes<RaySample*> seen_{};
 };
 
-/// Pixels of the image that are traced together.
+/// A block of pixels of the image that are traced together.
 struct Square {
     int x, y, columns, rows;
 };
 
-/// Each point stands for a stretch of the border as long as the spacing of the points. Where a contour or a crease
-/// crosses that, the mean of the stretch differs from the point.
+/// A point represents a stretch of the border as long as the spacing of the points. If a contour or a crease
+/// crosses that, the mean over the stretch differs from the point's value.
 struct BorderShift {
     double signal = 0;   ///< the mean less the point's, DN
-    double range_m = 0;  ///< of the edge; of two that of the larger change
+    double range_m = 0;  ///< of the edge; if two, of the one with the larger change
 };
 
-/// Points on the borders of a square's chosen pixels, as many on each as the grid has in a pixel's side.
+/// Points on the borders of a square's chosen pixels, `fineness` on each side of a pixel.
 class BorderPoints {
 public:
     BorderPoints(int fineness, const Square& square)
@@ -81,12 +81,12 @@ public:
     /// Point i on the left border of the square's pixel (c, r), from above.
     [[nodiscard]] const RaySample& left(int c, int r, int i) const { return left_.at(c, r * n_ + i); }
     [[nodiscard]] const BorderShift& left_shift(int c, int r, int i) const { return left_.shift(c, r * n_ + i); }
-    /// Point i on its upper border, from the left.
+    /// Point i on the upper border of the pixel, from the left.
     [[nodiscard]] const RaySample& upper(int c, int r, int i) const { return upper_.at(r, c * n_ + i); }
     [[nodiscard]] const BorderShift& upper_shift(int c, int r, int i) const { return upper_.shift(r, c * n_ + i); }
 
 private:
-    /// Lines of points all along the square, and one more at either end: point -1 to `n`.
+    /// Lines of points along the square, with one more point at either end: -1 to `n`.
     struct Lines {
         Lines(int lines, int count)
             : n(count), points(static_cast<std::size_t>(lines * (count + 2))), shifts(points.size()) {}
@@ -99,7 +99,7 @@ private:
         std::vector<RaySample> points;
         std::vector<BorderShift> shifts;
     };
-    /// Where two points of a line differ, the first of them.
+    /// The first of two neighbouring points of a line that differ.
     struct Step {
         Lines* lines;
         std::size_t first;

@@ -16,17 +16,17 @@
 namespace narpa {
 namespace {
 
-/// Two answers are the same within so many variances: five sigma.
+/// Two answers agree if their squared Mahalanobis distance is below this: five sigma.
 constexpr double kAgree = 25;
 /// The coarsest level shows the target no smaller than this.
-constexpr double kLeastExtent_px = 16;
+constexpr double kMinExtent_px = 16;
 
-/// Where a motion's standard deviation is larger than this part of the largest that counts as observed,
-/// the image may not be linear over it.
+/// A motion is weak if its standard deviation exceeds this part of the limit of observed motions: the image may not
+/// be linear over it.
 constexpr double kSurelyLinear = 0.2;
-/// Along so many motions that are held least, and at so many standard deviations, the loss then rises by at least
-/// this part of what a linear image's would. Far away a robust loss rises less. And by no more than where the
-/// valley along the motion bends, over one standard deviation, by one of the other motions.
+/// Test of linearity along the `motions` least observed motions. At `sigmas` standard deviations the loss must rise
+/// by at least the part `least` of a linear image's (smaller further away, where a robust loss rises less). It must
+/// rise by less than in a valley that bends by one standard deviation of another motion over one of this motion.
 struct Linear {
     int motions;
     double sigmas, least;
@@ -35,43 +35,43 @@ struct Linear {
     }
 };
 constexpr std::array kLinear{Linear{1, 4, 0.5}, Linear{3, 8, 0.35}};
-/// Answers that are turned by so much against the guess have a third start.
+/// An answer rotated by more than this from the guess is tested with a third start.
 constexpr double kFarTurn_rad = 0.07;
-/// Other minima are looked for so many standard deviations away.
+/// Other minima are searched from starts at this distance.
 constexpr double kAside_sigmas = 8;
 
-/// The answer is that with the smaller loss.
+/// Makes the pose with the smaller loss the answer.
 void keep_better(DenseEstimate& answer, DenseEstimate& other) {
     other.renders = answer.renders;
     if (other.excess_loss < answer.excess_loss) std::swap(answer, other);
 }
 
-/// One standard deviation of each of the two motions that the image holds least, if it is that weak.
+/// One standard deviation of each of the two least observed motions, if it is weak (kSurelyLinear).
 std::vector<Vector6> weak_motions(const DenseEstimate& e) {
-    constexpr int kMost = 2;
+    constexpr int kMax = 2;
     const Observability o = observability_of(e.covariance_of_image(), norm(e.T_camera_body.t));
     std::vector<Vector6> out;
-    for (int i = 0; i < kMost; ++i) {
+    for (int i = 0; i < kMax; ++i) {
         const Vector6 motion = o.motions.col(i) / std::sqrt(o.eigenvalues[i]);
-        if (std::max(motion.head<3>().norm() / kMostRotation_rad,
-                     motion.tail<3>().norm() / (kMostTranslation * norm(e.T_camera_body.t))) > kSurelyLinear)
+        if (std::max(motion.head<3>().norm() / kMaxRotation_rad,
+                     motion.tail<3>().norm() / (kMaxTranslation * norm(e.T_camera_body.t))) > kSurelyLinear)
             out.push_back(motion);
     }
     return out;
 }
 
-/// Turns a plane with this normal about its intersection with the image's so that it is tilted to the other side of
-/// the line of sight.
+/// Rotation of a plane with this normal about its intersection with the image plane to the same tilt on the other
+/// side of the line of sight.
 Quat other_tilt(const Vec3& normal, const Vec3& position_m) {
     const Vec3 axis = cross(normal, -normalized(position_m));
     const double sine = norm(axis);
     return sine > 1e-9 ? exp_rotation(2 * std::asin(std::min(1.0, sine)) / sine * axis) : Quat{};
 }
 
-/// The factor with which a descent begins: of the coarsest level that shows enough of a target of this extent.
+/// Factor of a descent's first level: the coarsest that shows enough of a target of this extent.
 int first_level(const DenseOptions& options, double target_px) {
     int factor = options.coarsest;
-    while (factor > options.finest && target_px / factor < kLeastExtent_px) factor /= 2;
+    while (factor > options.finest && target_px / factor < kMinExtent_px) factor /= 2;
     return factor;
 }
 
@@ -136,8 +136,10 @@ LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window&
     return *kept;
 }
 
-void DenseAlignment::weigh_alike(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
-                                 std::span<const float> frame_variance, DenseEstimate& a, DenseEstimate& b) {
+void DenseAlignment::evaluate_losses_on_common_pixels(const MeasuredImage& frame, const BodyPoses& at,
+                                                      const DenseOptions& options,
+                                                      std::span<const float> frame_variance, DenseEstimate& a,
+                                                      DenseEstimate& b) {
     if (a.window == b.window) return;
     const Camera camera = coarser_camera(camera_, options.finest);
     const Window both = joined(a.window, b.window);
@@ -163,11 +165,11 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         fit.guess_error = options.guess_error;
         const bool known = !frame_variance.empty() && options.model == ModelUncertainty{};
         fit.residual = e.residual;
-        fit.residual_most = known ? options.residual_most : options.residual_most_unknown;
-        if (known && has_independent_noise() && std::abs(e.blur) > options.blur_most && fit.failed.empty())
+        fit.residual_max = known ? options.residual_max : options.residual_most_unknown;
+        if (known && has_independent_noise() && std::abs(e.blur) > options.blur_max && fit.failed.empty())
             fit.failed =
                 fmt::format("{} blurred than the model, by {:.3g} standard deviations, expected at most {:g}",
-                            e.blur > 0 ? "more" : "less", std::abs(e.blur), options.blur_most);
+                            e.blur > 0 ? "more" : "less", std::abs(e.blur), options.blur_max);
     } else {
         fit.failed = name(e.status);
     }
@@ -175,8 +177,8 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
     return e;
 }
 
-/// A point spread function shares the samples of a pixel with its neighbours, and the colours of a mosaic are means
-/// of neighbours. Rounding is like noise where there is half a step of other noise (B. Widrow, IRE Trans. Circuit
+/// A point spread function shares samples between neighbouring pixels, and a mosaic's colours are means of
+/// neighbours. Rounding acts like noise if there is half a step of other noise (B. Widrow, IRE Trans. Circuit
 /// Theory 3, 1956).
 bool DenseAlignment::has_independent_noise() const {
     constexpr double kDithered = 3;  // half a step squared over rounding's variance, step^2 / 12
@@ -184,9 +186,9 @@ bool DenseAlignment::has_independent_noise() const {
            sensor_.read_dn2 >= kDithered * sensor_.rounding_dn2;
 }
 
-/// One of the mirrored starts must lead to the answer, or to a pose that is as likely. Its coarse levels suffice
-/// where they end close enough to the answer for one step to lead there. Where the first leads elsewhere, two of
-/// three starts, with the guess, lead to the answer, and its loss is the smaller one.
+/// One of the mirrored starts must lead to the answer, or to a pose that is as likely. Its coarse levels suffice if
+/// one step from their result leads to the answer. If the first start leads elsewhere, the answer is the pose with
+/// the smaller loss, and two of the three starts (with the guess) must lead to it.
 void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                              const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e,
                              Fit& fit) {
@@ -205,8 +207,7 @@ void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, co
     if (fit.failed.empty() && fit.rivals.empty()) start_near(frame, at, guess, options, frame_variance, e, fit);
 }
 
-/// Steps from where the other's coarse levels ended lead to the answer. The variance of the two is part of its
-/// error.
+/// True if steps from the other's coarse result lead to the answer. Adds the variance of the two to the covariance.
 bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options) {
     other.exposure = e.exposure, other.renders = 0;
     const Camera camera = coarser_camera(camera_, options.finest);
@@ -218,7 +219,8 @@ bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOp
     return apart.has_value();
 }
 
-/// The answer with the smaller loss stays. Where no pose is found from this start nothing changes.
+/// Descends from `start` to the finest level and keeps the pose with the smaller loss. No change if that finds no
+/// pose.
 void DenseAlignment::compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at,
                                         const DenseOptions& options, std::span<const float> frame_variance,
                                         const Rigid3& start, DenseEstimate& e, Fit& fit) {
@@ -227,20 +229,20 @@ void DenseAlignment::compare_to_the_end(const MeasuredImage& frame, const BodyPo
     DenseEstimate other = descend(frame, at, start, to_the_end, frame_variance, options.finest);
     e.renders += other.renders;
     if (other.status != DenseStatus::converged) return;
-    weigh_alike(frame, at, options, frame_variance, e, other);
+    evaluate_losses_on_common_pixels(frame, at, options, frame_variance, e, other);
     keep_better(e, other);
     const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
     const double worse = other.excess_loss - e.excess_loss;
     const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree;
-    fit.failed = agree || worse < kAsLikely ? "" : "two starts lead to different poses";
+    fit.failed = agree || worse < kRival_chi2 ? "" : "two starts lead to different poses";
     if (agree)
         e.covariance += 0.5 * apart * apart.transpose();
-    else if (worse < kAsLikely)
+    else if (worse < kRival_chi2)
         fit.rivals.push_back({other.T_camera_body, worse});
 }
 
-/// The coarsest levels may lead two starts away from a pose that is near the guess, to the same false minimum. So
-/// where they led far, a third start is without them. Only a pose with a smaller loss counts.
+/// The coarsest levels may lead both starts away from a pose near the guess, to the same false minimum. So if the
+/// answer is far from the guess, a third start skips them. Its pose counts only if its loss is smaller.
 void DenseAlignment::start_near(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                 const DenseOptions& options, std::span<const float> frame_variance,
                                 DenseEstimate& e, Fit& fit) {
@@ -264,9 +266,9 @@ void DenseAlignment::start_near(const MeasuredImage& frame, const BodyPoses& at,
         compare_to_the_end(frame, at, options, frame_variance, other.T_camera_body, e, fit);
 }
 
-/// What the covariance of a weak motion leaves out: other minima along it, or where a flat face is tilted to the
-/// other side of the line of sight; and an image that is linear in the pose over less than a few standard
-/// deviations. Of the descents beside a motion that counts as observed one must converge: else nothing was tested.
+/// Tests what the covariance of a weak motion does not include: other minima along it; a flat face tilted to the
+/// other side of the line of sight; an image that is not linear in the pose over a few standard deviations. If all
+/// motions count as observed, at least one of these descents must converge: else nothing was tested.
 void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
                              std::span<const float> frame_variance, DenseEstimate& e, Fit& fit) {
     const Camera camera = coarser_camera(camera_, options.finest);
@@ -295,7 +297,7 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
         tested = true;
-        weigh_alike(frame, at, options, frame_variance, e, other);
+        evaluate_losses_on_common_pixels(frame, at, options, frame_variance, e, other);
         minima.push_back(other);
         keep_better(e, other);
     }
@@ -303,10 +305,10 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
         fit.failed = "no descent beside the weakest motion converges, so that it is not tested";
     for (DenseEstimate& other : minima) {
         const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
-        if (!(normalised_error_squared(apart, e.covariance) > kElsewhere)) continue;
-        weigh_alike(frame, at, options, frame_variance, e, other);
+        if (!(normalised_error_squared(apart, e.covariance) > kDistinctPose_chi2)) continue;
+        evaluate_losses_on_common_pixels(frame, at, options, frame_variance, e, other);
         const double worse = other.excess_loss - e.excess_loss;
-        if (worse < kAsLikely) fit.rivals.push_back({other.T_camera_body, worse});
+        if (worse < kRival_chi2) fit.rivals.push_back({other.T_camera_body, worse});
     }
     LevelSolver solver(camera, render_scene_, target_, options.finest, view_of_answer(), options, e);
     solver.examine();
@@ -336,7 +338,7 @@ DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPose
             e.status = DenseStatus::left_the_picture;
             return e;
         }
-        // From a guess the target may have far to go.
+        // The first level uses the whole image, as the guess may be far off.
         if (first && factor > 1) window = Window{0, 0, camera.width, camera.height};
         LevelView& view = level(factor, camera, *window, at, options, frame, frame_variance);
         LevelSolver solver(camera, render_scene_, target_, factor, view, options, e);

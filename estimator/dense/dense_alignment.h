@@ -5,10 +5,10 @@
 /// Each level works in a window about the target. The image is rendered at each step with the same seed, so that
 /// its sampling noise hardly changes between steps.
 ///
-/// The last steps are of the pixels that hold most of the information about the pose (informative_pixels), about an
-/// eighth: a derivative of few lines chooses them, and each gets equally many samples, so that each one's variance
-/// is known from its own. With a budget that follows the contrasts between pixels, residuals about details smaller
-/// than a pixel were 1.7 times what it stated.
+/// The last steps use only the pixels that hold most of the information about the pose (informative_pixels), about
+/// an eighth. They are chosen by a derivative with few lines, and all get equally many samples, so that each one's
+/// variance is known from its own samples. With a sample budget that follows the contrast between pixels, residuals
+/// at details smaller than a pixel were 1.7 times their stated noise.
 #pragma once
 
 #include <array>
@@ -29,30 +29,30 @@ namespace narpa {
 /// pixel.
 struct DenseOptions {
     int iterations = 16;            ///< at most, on each level
-    int coarsest = 16, finest = 1;  ///< sensor pixels, each way, in a pixel of the first and of the last level
-    int samples_per_pixel = 8;      ///< of the finest level's images; the last take six or eight times as many
-    int fineness = 4;               ///< of the last derivative: lines each way across a pixel
+    int coarsest = 16, finest = 1;  ///< sensor pixels per pixel of the first and the last level, each way
+    int samples_per_pixel = 8;      ///< of the finest level's images; the last steps take 6 or 8 times as many
+    int fineness = 4;               ///< lines each way across a pixel, for the last derivative
     RenderSettings::Method method = RenderSettings::Method::direct;
     int max_depth = 8;  ///< of method path
     std::uint64_t seed = 1;
     ApparentMotion motion{};   ///< the target's, in camera axes: during the exposure, for cameras with a shutter
     GuessError guess_error{};  ///< answers further from the guess are refused
     ModelUncertainty model{};
-    /// The camera's pose in the world, where the light is known in the camera's axes: the target's attitude to the
-    /// light is then that of the pose, and its shading holds the attitude too. Empty: the light is known in the
-    /// target's axes, by its attitude in `at`.
+    /// The camera's pose in the world, if the light is known in camera axes: the pose then determines the target's
+    /// attitude relative to the light, so that its shading holds information about the attitude. Empty: the light
+    /// is known in target axes, from the target's attitude in `at`.
     std::optional<Rigid3> T_world_camera{};
-    /// An answer counts that two starts lead to, the guess and the guess mirrored in the first answer: false minima
-    /// and valleys in which steps end early are met from both sides. At most so many mirrored starts; 0: no such
-    /// test. Where the answer is far from the guess, the guess without the coarsest levels must not lead to a
-    /// better one.
+    /// Largest number of mirrored starts; 0: no test. An answer is accepted if two starts lead to it: the guess,
+    /// and the guess mirrored in the first answer. This approaches false minima, and valleys in which steps end
+    /// early, from both sides. If the answer is far from the guess, the guess without the coarsest levels must not
+    /// lead to a better one.
     int rivals = 2;
-    /// Largest residuals of a right pose (DenseEstimate::residual): of frames whose noise is known, that is, where
+    /// Largest accepted residual (DenseEstimate::residual): of frames whose noise is known, that is,
     /// `frame_variance` is given and the model is exact; and of others.
-    double residual_most = 1.15, residual_most_unknown = 6;
-    /// Largest blur that the model does not have (DenseEstimate::blur), where the noise is known and independent
-    /// from pixel to pixel: chance exceeds it in 6 of 10^5 frames.
-    double blur_most = 4;
+    double residual_max = 1.15, residual_most_unknown = 6;
+    /// Largest accepted blur beyond the model's (DenseEstimate::blur), if the noise is known and independent
+    /// between pixels: chance exceeds it in 6 of 10^5 frames.
+    double blur_max = 4;
 };
 
 enum class DenseStatus : std::uint8_t {
@@ -68,25 +68,24 @@ enum class DenseStatus : std::uint8_t {
 struct DenseEstimate {
     DenseStatus status = DenseStatus::converged;
     Rigid3 T_camera_body{};
-    /// PhotometricEquations::pose_covariance, widened where renders show that the Jacobian says too much of the
-    /// motions that are held least (response.h), and the model's uncertainty; zero unless converged.
+    /// PhotometricEquations::pose_covariance, widened where renders show a weaker response to the least observed
+    /// motions than the Jacobian predicts (response.h), plus the model's uncertainty; zero unless converged.
     Matrix6 covariance = Matrix6::Zero();
-    Matrix6 covariance_of_model = Matrix6::Zero();  ///< its part by the model's uncertainty
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< part of the model's uncertainty
     Exposure exposure{};
-    std::size_t pixels = 0;  ///< of the last level that show the target
-    std::size_t chosen = 0;  ///< of these that the last steps are of
-    int renders = 0;         ///< images that were compared with the frame
-    double misfit =
-        0;  ///< loss of the residuals beyond that of noise, per pixel of the target: Robustness{1, 3, 0}
-    /// RMS over that which noise makes, without a robust loss: of the target's pixels, or of those that hold the
-    /// pose (PhotometricEquations::residual), whichever is larger.
+    std::size_t pixels = 0;  ///< pixels of the last level that show the target
+    std::size_t chosen = 0;  ///< of these, pixels that the last steps use
+    int renders = 0;         ///< images compared with the frame
+    double misfit = 0;       ///< loss beyond that of noise, per target pixel: Robustness{1, 3, 0}
+    /// RMS residual over that expected from noise, without a robust loss: of the target's pixels, or of those that
+    /// determine the pose (PhotometricEquations::residual), whichever is larger.
     double residual = 0;
-    double excess_loss = 0;  ///< misfit of all pixels of `window` together, about a chi-square
+    double excess_loss = 0;  ///< loss beyond that of noise, sum over `window`, about a chi-square
     Window window{};         ///< of the last level
     double blur = 0;         ///< blur_score, standard deviations
     Answer answer;
 
-    /// Without what the model's uncertainty leaves open: that much the image itself holds.
+    /// Without the part of the model's uncertainty.
     [[nodiscard]] Matrix6 covariance_of_image() const { return covariance - covariance_of_model; }
 };
 
@@ -108,7 +107,7 @@ public:
     /// Exposure and gain of the frames from now on.
     void set_detector(const Detector& detector);
 
-    /// What `align` would refuse to look at.
+    /// The input checks of `align`.
     [[nodiscard]] Status check(const MeasuredImage& frame, std::span<const float> frame_variance,
                                const BodyPoses& at, const Rigid3& guess) const;
 
@@ -119,7 +118,7 @@ public:
                                         const DenseOptions& options, std::span<const float> frame_variance = {});
 
 private:
-    /// `last`: factor of the last level; coarser than the finest: for a pose alone.
+    /// `last`: factor of the last level; if coarser than the finest, only the pose is computed.
     [[nodiscard]] DenseEstimate descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                         const DenseOptions& options, std::span<const float> frame_variance,
                                         int last);
@@ -133,9 +132,10 @@ private:
                     const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
     void examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
                  std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
-    /// So that both losses are of the same pixels, those about either pose.
-    void weigh_alike(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
-                     std::span<const float> frame_variance, DenseEstimate& a, DenseEstimate& b);
+    /// Evaluates both losses over the same pixels: those about either pose.
+    void evaluate_losses_on_common_pixels(const MeasuredImage& frame, const BodyPoses& at,
+                                          const DenseOptions& options, std::span<const float> frame_variance,
+                                          DenseEstimate& a, DenseEstimate& b);
     LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
                      const DenseOptions& options, const MeasuredImage& frame,
                      std::span<const float> frame_variance);

@@ -21,8 +21,8 @@ namespace {
 constexpr double kViewStep = 1e-3;
 /// Pixels, each way, whose borders are traced together.
 constexpr int kSquare = 8;
-/// Parts of an exposure for each pixel of motion during it, and at the most.
-constexpr double kPartsPerPixel = 1, kMostParts = 8;
+/// Parts of an exposure per pixel of motion during it, and their largest number.
+constexpr double kPartsPerPixel = 1, kMaxParts = 8;
 
 bool depends_on_view(const Material& m) {
     if (is_specular(m) || m.kind == Material::Kind::lambert) return false;
@@ -49,7 +49,7 @@ Vec3 shading_change(const Frame& f, const SensorModel& sensor, const Ray& ray, c
     return (cosine * static_cast<double>(f.sun->irradiance()) / (2 * d)) * change;
 }
 
-/// The same at the middle of each chosen pixel of a square.
+/// The same at the centre of each chosen pixel of a square.
 class ShadingChanges {
 public:
     ShadingChanges(const Frame& f, const SensorModel& sensor, const Square& square,
@@ -66,8 +66,8 @@ public:
     }
     /// Of the square's pixel (c, r).
     [[nodiscard]] Vector6 at(int c, int r, const Vec3& t_camera_target) const {
-        // Against the target's axes the camera moves by what the target's origin moves, less what turns it about
-        // there.
+        // Relative to the target's axes the camera moves by the translation of the target's origin minus its
+        // rotation about that origin.
         const Vec3 g = conjugate(f_.T_world_camera.q) * changes_[index_in(kSquare, c, r)];
         Vector6 row;
         row << to_eigen(-cross(t_camera_target, g)), to_eigen(g);
@@ -117,7 +117,7 @@ ImageDerivative::ImageDerivative(const RenderScene& render_scene, const Camera& 
 }
 
 void ImageDerivative::begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
-    stand_still(at, at_);
+    copy_static_poses(at, at_);
     motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
 }
 
@@ -130,7 +130,7 @@ std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_targ
                              norm(motion_.rate_rad_s) * render_scene_.tracer().bounding_radius_m(target_)) /
                             range_m;
     const double blur_px = blur_rad * CameraModelHandle(camera_)->pixels_per_radian();
-    const int parts = static_cast<int>(std::clamp(std::ceil(kPartsPerPixel * blur_px), 1.0, kMostParts));
+    const int parts = static_cast<int>(std::clamp(std::ceil(kPartsPerPixel * blur_px), 1.0, kMaxParts));
     (void)place_camera(T_camera_target, camera_, target_, at_);
     std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));
     chosen_.assign(derivative_.size(), 1);
@@ -183,7 +183,7 @@ void ImageDerivative::add(const Rigid3& T_camera_target, const SensorModel& sens
         BorderPoints points(grid.fineness, square);
         PointTracer tracer(grid, sensor);
         points.trace(grid, tracer, camera_.width, chosen_);
-        const SquareSides sides(grid, tracer, points, camera_.width, chosen_);
+        const TileBorderFlow sides(grid, tracer, points, camera_.width, chosen_);
         each([&](int c, int r, const RowView& view) { return sides.flow_over_borders(c, r, view); });
     });
 }
@@ -197,7 +197,7 @@ void ImageDerivative::add_shading(const Rigid3& T_camera_target, const SensorMod
     });
 }
 
-/// The image's optics, over three columns at a time.
+/// Applies the image's optics, three columns at a time.
 void ImageDerivative::apply_optics() {
     for (const int first : {0, 3}) {
         for (std::size_t i = 0; i < derivative_.size(); ++i) {

@@ -1,4 +1,4 @@
-// LevelSolver: what the pose that its steps lead to is worth.
+// LevelSolver: covariance and status of the pose that its steps lead to.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,25 +11,25 @@
 namespace narpa {
 namespace {
 
-/// Residuals of more than this many times their noise: the model does not fit.
+/// The model does not fit if residuals are more than this many times their noise,
 constexpr double kNoFit = 4;
-/// Or a gain this many standard deviations off its prior.
-constexpr double kPriorHolds = 4, kLeastOff = 1e-3;
-/// Or a loss of so much beyond that of noise: station and cube in clean and in saturated frames have up to 8.
-constexpr double kMostMisfit = 10;
-/// The weakest motions are rendered so far to both sides: by so many standard deviations, but not many times the
-/// limit of observed motions, and at least by so many pixels.
+/// or the gain is off its prior by more than kPriorHolds standard deviations plus kMinOff,
+constexpr double kPriorHolds = 4, kMinOff = 1e-3;
+/// or the loss exceeds that of noise by more than this per pixel: station and cube in clean and saturated frames:
+/// 8.
+constexpr double kMaxMisfit = 10;
+/// The weakest motions are rendered to both sides: by kRendered_sigmas standard deviations, at most
+/// kRendered_limits times the limit of observed motions, at least kRendered_px pixels.
 constexpr double kRendered_sigmas = 2, kRendered_limits = 2, kRendered_px = 0.2;
-/// The measured response to a motion counts at most as this many times the Jacobian's: with larger ones covariances
-/// were too small.
-constexpr double kMostShown = 1.3;
+/// Upper limit of the measured response to a motion over the Jacobian's: larger ones made covariances too small.
+constexpr double kMaxShown = 1.3;
 
 }  // namespace
 
 void LevelSolver::finish() {
     const PhotometricImages images = view_.images();
     const PhotometricEquations last = equations(images, e_.exposure, robust_);
-    // The step that remains is a part of the error.
+    // The remaining step is part of the error.
     const Vector6 to_go = ldlt_solve(last.pose_information(), last.pose_gradient());
     const Matrix6 of_noise = last.pose_covariance();
     e_.covariance_of_model = covariance_of_model(last);
@@ -49,15 +49,14 @@ void LevelSolver::finish() {
     e_.residual =
         std::max(of_information, std::sqrt(loss.chi2 / static_cast<double>(std::max<std::size_t>(loss.pixels, 1))));
     const double off = std::abs(e_.exposure.gain - 1);
-    if (robust_.scale > kNoFit || e_.misfit > kMostMisfit ||
-        off > kPriorHolds * images.prior.gain_sigma + kLeastOff)
+    if (robust_.scale > kNoFit || e_.misfit > kMaxMisfit || off > kPriorHolds * images.prior.gain_sigma + kMinOff)
         e_.status = DenseStatus::does_not_fit;
     else
-        e_.covariance = covariance_by_response(of_noise, response_to_motions(last), kMostShown) +
+        e_.covariance = covariance_by_response(of_noise, response_to_motions(last), kMaxShown) +
                         e_.covariance_of_model + to_go * to_go.transpose();
 }
 
-/// Rendered to both sides, with equal samples.
+/// Measures the response by central differences of renders with equal samples.
 Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     const std::vector<float> signal(view_.images().signal.begin(), view_.images().signal.end()),
         variance(view_.images().signal_variance.begin(), view_.images().signal_variance.end());
@@ -110,7 +109,7 @@ Result<Matrix6> LevelSolver::bound() {
 Matrix6 LevelSolver::covariance_of_model(const PhotometricEquations& equations) {
     PoseShifts shifts = image_shifts(o_.model, e_.T_camera_body, o_.motion);
     if (o_.model.light_rad > 0) {
-        render(e_.T_camera_body);  // with the noise of those that it is compared with
+        render(e_.T_camera_body);  // with the same sampling noise as the image it is compared with
         PoseShifts by_light(6, 3);
         const PhotometricImages images = view_.images();
         for (int axis = 0; axis < 3; ++axis) {

@@ -10,18 +10,20 @@
 namespace narpa {
 namespace {
 
-/// A level converges when a step moves the target by less than this, px of the level; before a step to pixels a
-/// quarter as wide by less than that. The finest also when it is less than so many standard deviations of the pose.
+/// A level converges when a step moves the target by less than kConverged_px (its own pixels), or by less than
+/// kBeforeFarStep_px if the next level's pixels are a quarter as wide. The finest level also converges when a step
+/// is shorter than kConverged_sigmas standard deviations of the pose.
 constexpr double kConverged_px = 0.1, kBeforeFarStep_px = 0.05, kConverged_sigmas = 0.2;
-constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-7, kDampingStep = 10;
-constexpr int kMostRefused = 4;
+constexpr double kFirstDamping = 1e-3, kMinDamping = 1e-7, kDampingStep = 10;
+constexpr int kMaxRefused = 4;
 /// Steps that move the target by less are accepted without testing the cost, whose change is below its sampling
 /// noise.
 constexpr double kCoarseTrust_px = 0.5, kFineTrust_px = 0.1;
-/// A level ends after so many steps in a row that are no smaller than this part of the smallest before.
-constexpr int kMostStalled = 2;
+/// A level ends after kMaxStalled consecutive steps that are not shorter than kShrinking times the shortest
+/// before.
+constexpr int kMaxStalled = 2;
 constexpr double kShrinking = 0.9;
-/// Steps of up to this many times the convergence threshold are attributed to that noise too.
+/// Steps of up to this many times the convergence threshold are also attributed to sampling noise.
 constexpr double kStillSmall = 10;
 /// Least relative decrease of a coarse level's cost per step that counts as progress.
 constexpr double kCoarseGain = 0.01;
@@ -30,46 +32,47 @@ constexpr double kSameWay = 0.7, kLongestStride = 8;
 /// Sampling noise may increase the cost of a good step by this part.
 constexpr double kSlack = 1e-3;
 constexpr std::size_t kFewestPixels = 12;
-/// Coarse levels: factor of the number of samples, as their pixels have more details and less noise, and are few.
-/// All steps but the last of the finest level: factor by which their derivative has fewer lines.
+/// kCoarseSamples: factor of the number of samples on coarse levels, whose pixels are few and have more details and
+/// less noise. kCoarseFineness: divisor of the derivative's lines for all steps but the last of the finest level.
 constexpr int kCoarseSamples = 2;
 constexpr int kCoarseFineness = 2;
-/// The image and the derivative from which pixels of a large target are chosen: the part of the usual number of
+/// For the image and the derivative from which pixels of a large target are chosen: divisor of the number of
 /// samples, and the number of lines.
 constexpr int kChoiceSamples = 4, kChoiceFineness = 1;
-/// The pixels that are chosen hold this part of the information together.
+/// Part of the information that the chosen pixels hold together.
 constexpr double kHeld = 0.8;
-/// Pixels are chosen where the target covers at least this many: fewer take little time.
+/// Pixels are chosen if the target covers at least this many: fewer take little time anyway.
 constexpr std::size_t kManyPixels = 10'000;
-/// The last steps. In a curved valley steps end early, and the derivative leaves about a tenth of a step.
+/// Parameters of the last steps. In a curved valley steps end early, and the derivative leaves about a tenth of a
+/// step.
 struct LastSteps {
     int first_samples,
-        samples;  ///< factors of the number of samples: before and after a step shorter than the next
+        samples;  ///< sample factors: before and after a step shorter than before_sigmas
     double before_sigmas;
     double sigmas, px;  ///< the last step is shorter than one of these: in standard deviations, in pixels
     double serves_px;   ///< the Jacobian is reused for poses within this motion
 };
-/// Chosen pixels show fine details: samples are what limits them, and low-discrepancy ones are best in powers of
+/// Chosen pixels show fine details and are limited by sampling noise; low-discrepancy samples are best in powers of
 /// two.
 constexpr LastSteps kOfAll{6, 6, 0, 1, 0.02, 0.02}, kOfChosen{4, 8, 20, 3, 0, 0.1};
-constexpr int kMostPolishes = 5;
+constexpr int kMaxPolishes = 5;
 /// Two poses at most kReach_px apart count as one minimum if steps from one leave at most the part kLeft of the
 /// distance to the other, or a squared Mahalanobis distance below kLeftVariances.
 constexpr double kReach_px = 1, kLeft = 0.5, kLeftVariances = 25;
 constexpr int kMeetingSteps = 2;
-constexpr int kMostShift_px = 12;
+constexpr int kMaxShift_px = 12;
 /// Model error on coarse levels: this part of the signal power.
 constexpr double kCoarseModel = 0.1;
-constexpr double kLeastGain = 0.05;
+constexpr double kMinGain = 0.05;
 /// The Jacobian is reused for poses within this motion, px.
 constexpr double kDerivativeServes_px = 0.2;
-/// Pixels are chosen when a step is shorter than this: those that hold the pose show details smaller than a pixel,
-/// from which steps lead nowhere from further off. After kMostBeforeChoice steps, when one is shorter than
+/// Pixels are chosen when a step is shorter than this: the pixels that determine the pose show details smaller than
+/// a pixel, whose Jacobian is valid only nearby. After kMaxBeforeChoice steps, when one is shorter than
 /// kDerivativeServes_px.
 constexpr double kChooses_px = 0.1;
-constexpr int kMostBeforeChoice = 2;
+constexpr int kMaxBeforeChoice = 2;
 
-/// Largest motion of a point of the target in the image, about.
+/// Approximate largest motion of a point of the target in the image.
 double motion_px(const Vector6& step, double pixels_per_radian, const Rigid3& T_camera_target, double extent_px) {
     const double z = std::max(T_camera_target.t.z, 1e-9);
     return pixels_per_radian * step.segment<2>(3).norm() / z +
@@ -126,7 +129,7 @@ DenseStatus LevelSolver::run(bool first) {
     return status;
 }
 
-/// `samples`: of a pixel once they are chosen.
+/// `samples`: per pixel once pixels are chosen.
 DenseStatus LevelSolver::iterate(int samples) {
     robust_.model_dn2 = coarse_ ? kCoarseModel * signal_power(view_.images()) : 0;
     double damping = kFirstDamping;
@@ -145,8 +148,8 @@ DenseStatus LevelSolver::iterate(int samples) {
         if (k == 0) ++e_.renders;
         const double cost_before = cost_.robust;
         Step step = next_step(damping);
-        const double most_px = k < kMostBeforeChoice ? kChooses_px : kDerivativeServes_px;
-        const bool chosen = choosing_ && step.motion_px < most_px;
+        const double max_px = k < kMaxBeforeChoice ? kChooses_px : kDerivativeServes_px;
+        const bool chosen = choosing_ && step.motion_px < max_px;
         if (chosen) {
             choose(step.pose);
             settings_.spp = samples;
@@ -157,18 +160,18 @@ DenseStatus LevelSolver::iterate(int samples) {
             return DenseStatus::converged;
         }
         for (int refused = 0; !try_step(step); ++refused) {
-            if (refused == kMostRefused) return DenseStatus::diverged;
+            if (refused == kMaxRefused) return DenseStatus::diverged;
             if (stride_ == 1) damping *= kDampingStep;
             stride_ = 1;
             step = next_step(damping);
         }
-        // Sampling noise keeps the pose moving.
+        // Sampling noise keeps the pose moving: ends when steps neither shrink nor reduce the cost.
         const bool shrinks = step.size < kShrinking * least;
         const bool gains = coarse_ ? cost_.robust < (1 - kCoarseGain) * cost_before : step.size > kStillSmall;
         stalled = shrinks || gains ? 0 : stalled + 1;
         least = std::min(least, step.size);
-        if (step.trusted && stalled == kMostStalled) return DenseStatus::converged;
-        damping = std::max(damping / kDampingStep, kLeastDamping);
+        if (step.trusted && stalled == kMaxStalled) return DenseStatus::converged;
+        damping = std::max(damping / kDampingStep, kMinDamping);
         adapt_stride(step);
     }
     return least < kStillSmall ? DenseStatus::converged : DenseStatus::out_of_steps;
@@ -181,10 +184,10 @@ void LevelSolver::polish() {
     stride_ = 1;
     render(e_.T_camera_body);
     ++e_.renders;
-    for (int k = 0; k < kMostPolishes; ++k) {
+    for (int k = 0; k < kMaxPolishes; ++k) {
         differentiate(last.serves_px, o_.fineness);
         if (!linearise()) return;
-        Step step = next_step(kLeastDamping);
+        Step step = next_step(kMinDamping);
         if (settings_.spp == samples && (step.sigmas < last.sigmas || step.motion_px < last.px)) {
             take(step);
             view_.predict(step.pose);
@@ -198,7 +201,7 @@ void LevelSolver::polish() {
     }
 }
 
-/// The others keep the samples that they have, as the image is after this last step of theirs.
+/// Pixels that are not chosen keep their samples, with the signal predicted after this step.
 void LevelSolver::choose(const Vector6& step) {
     std::vector<std::uint8_t> pixels = informative_pixels(view_.images(), e_.exposure, kHeld);
     view_.predict(step);
@@ -221,7 +224,7 @@ std::optional<Vector6> LevelSolver::miss(const Rigid3& T_camera_body) {
         ++e_.renders;
         differentiate(kReach_px, std::max(1, o_.fineness / kCoarseFineness));
         if (!linearise()) return {};
-        e_.T_camera_body = displaced(e_.T_camera_body, next_step(kLeastDamping).pose);
+        e_.T_camera_body = displaced(e_.T_camera_body, next_step(kMinDamping).pose);
         left = error_between(e_.T_camera_body, T_camera_body);
         const Matrix6 information = equations_.pose_information() / (robust_.scale * robust_.scale);
         const double most = std::max(kLeftVariances, kLeft * kLeft * way.dot(information * way));
@@ -249,7 +252,7 @@ void LevelSolver::examine() {
 }
 
 void LevelSolver::shift() {
-    const int most = std::min({kMostShift_px, view_.window().width / 4, view_.window().height / 4});
+    const int most = std::min({kMaxShift_px, view_.window().width / 4, view_.window().height / 4});
     const auto [dx, dy] = best_shift(view_.images(), most);
     if (dx == 0 && dy == 0) return;
     Vector6 sideways = Vector6::Zero();
@@ -261,7 +264,8 @@ void LevelSolver::shift() {
 
 void LevelSolver::render(const Rigid3& T) {
     view_.render(T, settings_);
-    // Of a large target thousands of pixels determine the pose, and overstated variances bias the score of a blur.
+    // With a large target thousands of pixels determine the pose, and overstated variances would bias the blur
+    // score.
     if (!coarse_ && pixels_of(view_.window()) < kManyPixels) view_.allow_for_missed_light(settings_.spp);
 }
 
@@ -299,8 +303,8 @@ double LevelSolver::distance_px(const Vector6& step) const {
     return motion_px(step, pixels_per_radian_, e_.T_camera_body, extent_px(view_.window()));
 }
 
-/// Fine details that are further off than their extent shorten steps: while consecutive steps are parallel, they
-/// are lengthened.
+/// Fine details that are off by more than their extent make steps too short: while consecutive steps are parallel,
+/// they are lengthened.
 void LevelSolver::adapt_stride(const Step& step) {
     const Matrix6 information = equations_.pose_information();
     const double along = step.pose.dot(information * last_step_);
@@ -327,7 +331,7 @@ bool LevelSolver::try_step(const Step& step) {
 
 Exposure LevelSolver::after(const Step& step) const {
     const Eigen::Vector2d e = equations_.exposure_step(step.pose);
-    return {std::max(e_.exposure.gain + e[0], kLeastGain), e_.exposure.offset_dn + e[1]};
+    return {std::max(e_.exposure.gain + e[0], kMinGain), e_.exposure.offset_dn + e[1]};
 }
 
 void LevelSolver::take(const Step& step) {

@@ -9,39 +9,41 @@ namespace narpa {
 /// Finite, and a rotation.
 [[nodiscard]] bool is_pose(const Rigid3& T);
 
-/// The pyramid level after one whose pixels are `factor` sensor pixels wide; 0 after the finest. Where the target
-/// is large (`extent_px`, sensor pixels), a level finds the pose to so few of its pixels that the last step may be
-/// to pixels a quarter as wide.
+/// Factor of the pyramid level after one whose pixels are `factor` sensor pixels wide; 0 after the finest. With a
+/// large target (`extent_px`, sensor pixels) a level determines the pose to a small part of its pixels, so that the
+/// next, last level may have pixels a quarter as wide.
 [[nodiscard]] int next_level(int factor, int finest, double extent_px);
 
 class LevelSolver {
 public:
-    /// All outlive it. `camera`: of the level, each of whose pixels is `factor` x `factor` of the sensor's.
+    /// All references outlive it. `camera`: of the level; each of its pixels covers `factor` x `factor` sensor
+    /// pixels.
     LevelSolver(const Camera& camera, const RenderScene& render_scene, std::size_t target, int factor,
                 LevelView& view, const DenseOptions& options, DenseEstimate& estimate);
 
-    /// Iterates on this level; `first`: after a search over shifts by whole pixels, as a guess may be off by more
+    /// Iterates on this level. `first`: first searches over shifts by whole pixels, as a guess may be off by more
     /// than the Jacobian is valid for.
     DenseStatus run(bool first);
     /// One more step with many more rays, against the sampling noise of the rendered image.
     void polish();
     /// Covariance, residuals and status at the last rendered pose. Leaves another pose rendered.
     void finish();
-    /// The loss at the estimate's pose again, of this view's pixels.
+    /// Evaluates the loss at the estimate's pose again, over this view's pixels.
     void weigh();
-    /// Steps from the estimate's pose end so far from the other; nothing where they do not lead there or most of
-    /// the way, or where one of them is beyond the Jacobian's reach. Takes a Jacobian where the view has none of
-    /// there.
+    /// Remaining distance to the other pose after steps from the estimate's; empty if they do not lead there or
+    /// most of the way, or if the distance exceeds the Jacobian's validity. Computes a Jacobian if the view has
+    /// none there.
     [[nodiscard]] std::optional<Vector6> miss(const Rigid3& T_camera_body);
-    /// Renders with the last step's rays and linearises at the estimate's pose.
+    /// Renders with as many samples as the last step and linearises at the estimate's pose.
     void examine();
     struct Rise {
         double least, most;
     };
-    /// After examine(): how the loss rises along the `motions` that the image holds least, over what it should,
-    /// at this many standard deviations to both sides. About one where the image is linear so far.
+    /// After examine(): smallest and largest rise of the loss along the `motions` least observed motions, at this
+    /// many standard deviations to both sides, over that of a linear image. About one if the image is linear so
+    /// far.
     [[nodiscard]] Rise rise(int motions, double sigmas);
-    /// DenseAlignment::bound at the estimate.
+    /// The bound of DenseAlignment::bound, at the estimate.
     Result<Matrix6> bound();
 
 private:
@@ -57,22 +59,22 @@ private:
     DenseStatus iterate(int samples);
     void choose(const Vector6& step);
     void render(const Rigid3& T);
-    /// As the next step needs it.
+    /// With the reach and fineness that the next step needs.
     void differentiate();
     void differentiate(double reach_px, int fineness);
     bool linearise();
     [[nodiscard]] Step next_step(double damping) const;
-    /// Largest motion of a point of the target in the image, about.
+    /// Approximate largest motion of a point of the target in the image.
     [[nodiscard]] double distance_px(const Vector6& step) const;
     bool try_step(const Step& step);
     [[nodiscard]] Exposure after(const Step& step) const;
-    /// Without an image.
+    /// Applies the step without rendering.
     void take(const Step& step);
     void adapt_stride(const Step& step);
-    /// What the image shows of motions, as errors of the pose: the identity where the Jacobian is right. `last`:
-    /// the equations at the last rendered pose.
+    /// Response of the image to motions, as errors of the pose: the identity if the Jacobian is exact. `last`: the
+    /// equations at the last rendered pose.
     [[nodiscard]] Matrix6 response_to_motions(const PhotometricEquations& last);
-    /// By what is not known of the model, at the last rendered pose.
+    /// Covariance from the model's uncertainty, at the last rendered pose.
     [[nodiscard]] Matrix6 covariance_of_model(const PhotometricEquations& equations);
 
     const Camera& camera_;
@@ -85,7 +87,7 @@ private:
     const bool coarse_;
     const double converged_px_;
     FrameSettings settings_{};
-    bool choosing_;  ///< the pixels that hold the pose are to be chosen: the target is large, and they are not yet
+    bool choosing_;  ///< informative pixels of a large target are still to be chosen
 
     Robustness robust_{};
     PhotometricCost cost_{};

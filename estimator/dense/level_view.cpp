@@ -18,8 +18,7 @@ constexpr double kRoom_px = 6, kRoomPart = 0.1;
 /// Windows begin and end at multiples of this, so that small motions do not change them.
 constexpr int kRounding_px = 8;
 
-/// Corners of a polygon about an ellipsoid's outline as the camera sees it, camera axes; none where the camera is
-/// inside.
+/// Polygon around an ellipsoid's outline as the camera sees it, camera axes; empty if the camera is inside.
 std::optional<std::array<Vec3, 32>> outline(const BodyBounds& bounds, const Rigid3& T_camera_target) {
     // In the space where the ellipsoid is a unit sphere the outline is a circle.
     const Vec3 eye = (inverse(T_camera_target).t - bounds.centre_m) / bounds.semi_axes_m;
@@ -123,7 +122,7 @@ void LevelView::measure(const MeasuredImage& image, std::span<const float> varia
         }
 }
 
-/// Where the camera is known to be, the pose places the target in the light.
+/// If the camera's pose in the world is known, the target's pose determines its illumination.
 void LevelView::place(const Rigid3& T_camera_target) {
     if (!T_world_camera_) return;
     at_.set(target_, *T_world_camera_ * T_camera_target);
@@ -195,7 +194,7 @@ void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings
     if (T_world_camera_) add_shading(T_camera_target, settings);
 }
 
-/// Not 0 where a chosen pixel or its neighbours are lit.
+/// Mask: not 0 where a chosen pixel or one of its neighbours is lit.
 std::vector<std::uint8_t> LevelView::lit() const {
     std::vector<std::uint8_t> out(signal_.size());
     const auto width = static_cast<std::size_t>(window_.width);
@@ -211,7 +210,7 @@ std::vector<std::uint8_t> LevelView::lit() const {
     return out;
 }
 
-/// Adds what the shading changes by while the target turns under its light, by differences.
+/// Adds the change of shading as the target turns relative to its light, by finite differences.
 void LevelView::add_shading(const Rigid3& T_camera_target, const FrameSettings& settings) {
     constexpr double kTurn_rad = 0.01;
     for (int axis = 0; axis < 3; ++axis) {
@@ -225,7 +224,7 @@ void LevelView::add_shading(const Rigid3& T_camera_target, const FrameSettings& 
 
 std::optional<Vec3> LevelView::flat_face() const {
     constexpr int kRaysAcross = 32;
-    constexpr double kSteps = 100;  // of a normal's components
+    constexpr double kSteps = 100;  // quantisation steps of a normal's components
     const int step = std::max(1, std::max(window_.width, window_.height) / kRaysAcross);
     std::map<std::array<long, 3>, int> faces;
     int all = 0;

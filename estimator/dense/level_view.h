@@ -17,7 +17,7 @@ struct Window {
     int x = 0, y = 0, width = 0, height = 0;
     friend bool operator==(const Window&, const Window&) = default;
 };
-/// The smallest that holds both.
+/// The smallest window that contains both.
 [[nodiscard]] Window joined(const Window& a, const Window& b);
 
 /// The window that holds the target's bounds at this pose, with a margin; nothing where they are outside the image
@@ -30,42 +30,42 @@ struct Window {
 /// Signal and Jacobian in a window of the camera's image.
 class LevelView {
 public:
-    /// `render_scene` and `sensor` outlive it. `pixels_averaged`: of the sensor's, in each pixel of `camera`.
+    /// `render_scene` and `sensor` outlive it. `pixels_averaged`: sensor pixels in each pixel of `camera`.
     LevelView(const RenderScene& render_scene, const Camera& camera, const SensorModel& sensor,
               double pixels_averaged, const Window& window, std::size_t target, const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
-    /// As ModelView::begin_frame; `times`: of the rows of `camera`. Of `model` brightness and light widen what is
-    /// expected of the pixels. `T_world_camera`: DenseOptions.
+    /// Like ModelView::begin_frame; `times`: of the rows of `camera`. `model`: its uncertainty of brightness and
+    /// light increases the pixels' expected variance. `T_world_camera`: DenseOptions.
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
                      const ModelUncertainty& model, const std::optional<Rigid3>& T_world_camera);
     /// Copies the window from the level's measured image and variance (or none).
     void measure(const MeasuredImage& image, std::span<const float> variance);
     void render(const Rigid3& T_camera_target, const FrameSettings& settings);
-    /// After `render` of all pixels with so many samples each: makes no variance less than that of half a sample of
-    /// the contrast with the neighbours. The sample variance of a pixel with few bright samples is unreliable:
-    /// stratified samples measure the bright area to about half a sample, so that all may miss it. This overstates
-    /// the variance beside edges.
+    /// After `render` of all pixels with this many samples each: raises each variance to at least that of half a
+    /// sample of the contrast with the neighbours. The sample variance of a pixel with few bright samples is
+    /// unreliable: stratified samples measure the bright area to about half a sample, so that all may miss it. This
+    /// overstates the variance beside edges.
     void allow_for_missed_light(int samples);
-    /// Moves the latest render's signal by so small a step of the pose that the Jacobian tells its change.
+    /// Updates the latest render's signal for a small step of the pose, by the Jacobian.
     void predict(const Vector6& step);
-    /// From now on `render` and `differentiate` work on these pixels alone, those that are not 0. The others keep
-    /// their signal, and lose their Jacobian.
+    /// From now on `render` and `differentiate` process only the pixels whose mask is not 0. The others keep their
+    /// signal but lose their Jacobian.
     void choose(std::vector<std::uint8_t> pixels);
     void choose_all();
-    /// Changes of the latest render's signal, DN, were the target turned under its light by `turn_rad`, target
-    /// axes, and seen at the same pose.
+    /// Changes of the latest render's signal, DN, if the target were rotated relative to its light by `turn_rad`,
+    /// target axes, and seen at the same pose.
     [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
                                                        const Vec3& turn_rad);
-    /// At the pose of the latest render, where that has light.
+    /// At the pose of the latest render, for lit pixels.
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
-    /// The pose of this frame's latest Jacobian, and its fineness.
+    /// Pose and fineness of this frame's latest Jacobian.
     [[nodiscard]] const std::optional<Rigid3>& differentiated_at() const noexcept { return differentiated_at_; }
     [[nodiscard]] int fineness() const noexcept { return fineness_; }
-    /// Of the target's surface at the latest render's pose at least a third has this normal, camera axes: a flat
-    /// face.
+    /// Normal, camera axes, of a flat face: at least a third of the target's visible surface at the latest render's
+    /// pose. Empty: none.
     [[nodiscard]] std::optional<Vec3> flat_face() const;
-    /// The latest of each.
+    /// The latest measured and rendered images and Jacobian.
     [[nodiscard]] PhotometricImages images() const;
 
 private:

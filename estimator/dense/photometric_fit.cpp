@@ -99,7 +99,7 @@ void add_square(Matrix8& sum, const Vector8& J, double weight, int first) {
     }
 }
 
-/// Of blocks of kBlock_px x kBlock_px pixels. k: scale of Cauchy's loss.
+/// Sums over blocks of kBlock_px x kBlock_px pixels. k: scale of Cauchy's loss.
 Matrix8 scatter_of_blocks(const PhotometricImages& images, const Residuals& residuals, double k) {
     constexpr int kBlock_px = 8;
     const auto across = static_cast<std::size_t>(images.width / kBlock_px + 1);
@@ -203,7 +203,7 @@ PhotometricEquations equations(const PhotometricImages& images, const Exposure& 
         residuals.each(y, [&](const Residual& r, std::size_t p) {
             const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
             const Vector8 J = r.inverse_s * design(images, exposure, p);
-            const int first = images.derivative[p].isZero(0) ? 6 : 0;  // not 0 from there on
+            const int first = images.derivative[p].isZero(0) ? 6 : 0;  // first column that is not 0
             add_square(row.information, J, weight, first);
             if (scatter) add_square(row.scatter, J, weight * weight * r.r * r.r, first);
             row.gradient += weight * r.r * J;
@@ -235,7 +235,7 @@ Matrix6 PhotometricEquations::pose_covariance() const {
         (inverse * block_scatter).trace() > (inverse * scatter).trace() ? block_scatter : scatter;
     const bool as_expected = (inverse * larger).trace() <= 8;
     const Matrix6 C = (as_expected ? inverse : Matrix8(inverse * larger * inverse)).topLeftCorner<6, 6>();
-    return 0.5 * (C + C.transpose());  // but for rounding
+    return 0.5 * (C + C.transpose());  // removes asymmetry due to rounding
 }
 
 double PhotometricEquations::residual() const {
@@ -307,8 +307,8 @@ double blur_score(const PhotometricImages& images, const Exposure& exposure, con
         }
     };
     const Residuals residuals(images, exposure, 0);
-    // How a blur changes a pixel: as its variance times half the Laplacian. Noise of the pixel's own samples is in
-    // both that and its residual: it must be small.
+    // A blur changes a pixel by its variance times half the Laplacian. The pixel's own sampling noise is in both
+    // the Laplacian and the residual, so it must be small.
     const auto by_blur = [&](const Residual& r, std::size_t p) {
         if (!images.chosen.empty() && images.chosen[p] == 0 && images.signal[p] != 0) return 0.0;
         const auto& S = images.signal;
@@ -321,7 +321,7 @@ double blur_score(const PhotometricImages& images, const Exposure& exposure, con
                                    row.shared += by_blur(r, p) * r.inverse_s * design(images, exposure, p);
                                });
                            }).shared;
-    const Vector8 taken = fit.information.inverse() * shared;  // by pose and exposure
+    const Vector8 taken = fit.information.inverse() * shared;  // part explained by pose and exposure
     const Sum sum = sum_rows<Sum>(images, [&](int y, Sum& row) {
         residuals.each(y, [&](const Residual& r, std::size_t p) {
             const double term = (by_blur(r, p) - r.inverse_s * design(images, exposure, p).dot(taken)) * r.r;
@@ -348,13 +348,13 @@ double PhotometricCost::excess() const {
 }
 
 bool PhotometricEquations::observes_pose() const {
-    constexpr double kLeast = 1e-10;
+    constexpr double kMin = 1e-10;
     const Matrix6 of_pose = pose_information();
     const Vector6 sizes = of_pose.diagonal();
     if (!(sizes.minCoeff() > 0) || !sizes.allFinite()) return false;
     const Vector6 unit = sizes.cwiseSqrt().cwiseInverse();
     const Matrix6 scaled = unit.asDiagonal() * of_pose * unit.asDiagonal();
-    return symmetric_eigen(scaled).values[0] > kLeast;
+    return symmetric_eigen(scaled).values[0] > kMin;
 }
 
 }  // namespace narpa

@@ -5,8 +5,8 @@
 /// predicted DN + gain^2 times the variance of the prediction + the frame's own variance + that of the model's
 /// error. Gain and offset have Gaussian priors and are eliminated by the Schur complement.
 ///
-/// A clipped pixel is a lower limit of the light: its residual is what the prediction is too dark by, and it says
-/// nothing where the prediction is as bright (censored data; J. Tobin, Econometrica 26, 1958). Predictions are
+/// A clipped pixel is a lower limit of the light: its residual is the amount by which the prediction is too dark,
+/// and none where the prediction is as bright (censored data; J. Tobin, Econometrica 26, 1958). Predictions are
 /// never clipped, so a dark pixel cannot be explained by light beyond the end of the scale.
 #pragma once
 
@@ -28,32 +28,32 @@ struct ExposurePrior {
     double gain_sigma = 0.05, offset_sigma_dn = 2;
 };
 
-/// All of one camera, row-major, width x height.
+/// Images of one camera, row-major, width x height.
 struct PhotometricImages {
     int width = 0, height = 0;
     const SensorModel& sensor;
-    std::span<const float> measured;           ///< DN; empty: as predicted, and clipped (the bound)
+    std::span<const float> measured;           ///< DN; empty: as predicted, and clipped (for the bound)
     std::span<const float> measured_variance;  ///< DN^2 beside the sensor's noise; empty: none
     std::span<const float> signal;             ///< predicted DN above black, not clipped
-    std::span<const float> signal_variance;    ///< of its own noise, DN^2; empty: none
+    std::span<const float> signal_variance;    ///< of the prediction's sampling noise, DN^2; empty: none
     std::span<const PixelDerivative> derivative;
-    double pixels_averaged = 1;  ///< each pixel is the mean of so many of the sensor's
+    double pixels_averaged = 1;  ///< number of sensor pixels averaged in each pixel
     ExposurePrior prior{};
     std::span<const std::uint8_t> measured_clipped{};  ///< MeasuredImage::clipped; empty: nowhere
-    /// Not 0: pixels that hold the pose (informative_pixels). The others have no derivative and fewer samples;
-    /// gain, offset and the size of the residuals follow from all. Empty: all.
+    /// Mask: not 0 for the pixels that determine the pose (informative_pixels). The others have no derivative and
+    /// fewer samples; gain, offset and the residuals' scale use all. Empty: all.
     std::span<const std::uint8_t> chosen{};
     double model_part = 0;  ///< standard deviation of the prediction's model error, as a part of the signal
 };
 
 struct PhotometricCost {
     double robust = 0;  ///< sum of Cauchy's loss, (k s)^2 ln(1 + (r / k s)^2), of normalised residuals, + prior
-    double chi2 = 0;    ///< of the same pixels, plain
+    double chi2 = 0;    ///< sum of squared residuals of the same pixels
     std::size_t pixels = 0;      ///< that show the target: signal or Jacobian not zero
     std::size_t all_pixels = 0;  ///< that `robust` is the sum of
 
     PhotometricCost& operator+=(const PhotometricCost& b);
-    /// `robust` beyond that of noise, with the default Robustness.
+    /// `robust` minus its expected value for noise, with the default Robustness.
     [[nodiscard]] double excess() const;
 };
 
@@ -79,45 +79,44 @@ struct Robustness {
 struct PhotometricEquations {
     Eigen::Matrix<double, 8, 8> information = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 1> gradient = Eigen::Matrix<double, 8, 1>::Zero();
-    /// Empirical covariance of the gradient, from the residuals, and the prior: of pixels that are independent, and
-    /// of blocks of pixels whose residuals share an error of the model.
+    /// Empirical covariance of the gradient, from the residuals, plus the prior: for independent pixels, and for
+    /// blocks of pixels whose residuals share a model error.
     Eigen::Matrix<double, 8, 8> scatter = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 8> block_scatter = Eigen::Matrix<double, 8, 8>::Zero();
 
     PhotometricEquations& operator+=(const PhotometricEquations& b);
     /// Information of the pose with gain and offset marginalised.
     [[nodiscard]] Matrix6 pose_information() const;
-    /// The least eigenvalue of the pose's information, scaled to a unit diagonal, is not that of rounding.
+    /// True if the least eigenvalue of the pose's information, scaled to a unit diagonal, is above rounding.
     [[nodiscard]] bool observes_pose() const;
     [[nodiscard]] Vector6 pose_gradient() const;
     /// Inverse information where residuals are no larger than their noise; else the sandwich estimator (P. J.
     /// Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 5th Berkeley Symposium,
     /// 1967), of independent pixels or of blocks (K.-Y. Liang, S. Zeger, Biometrika 73, 1986), whichever is larger.
     [[nodiscard]] Matrix6 pose_covariance() const;
-    /// Size of the residuals of the pixels that hold the pose, over that which noise makes: root of the mean of
-    /// their squares, weighed by information.
+    /// RMS residual over that expected from noise, weighted by the pixels' information about the pose.
     [[nodiscard]] double residual() const;
-    /// Step of the pose that answers a change of the measured image whose `response` this is.
+    /// Step of the pose for a change of the measured image with this `response`.
     [[nodiscard]] Vector6 pose_step(const Eigen::Matrix<double, 8, 1>& response) const;
     /// Step of gain and offset for a step of the pose (back substitution).
     [[nodiscard]] Eigen::Vector2d exposure_step(const Vector6& pose_step) const;
 };
-/// Without `scatter` that is the prior's alone, and it takes a third of the time: for steps.
+/// scatter = false: the scatter is the prior's alone, which takes a third of the time; sufficient for steps.
 [[nodiscard]] PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure,
                                              const Robustness& robust, bool scatter = true);
 /// The fewest pixels that together hold this part of the information about the pose, all motions alike: those of
 /// the largest leverage (D. C. Hoaglin, R. E. Welsch, The American Statistician 32, 1978), at the noise of sensor
-/// and frame. Does not depend on the measured image but by what of it is clipped.
+/// and frame. Depends on the measured image only through its clipped pixels.
 [[nodiscard]] std::vector<std::uint8_t> informative_pixels(const PhotometricImages& images,
                                                            const Exposure& exposure, double part);
-/// By how many standard deviations the residuals show a blur that the prediction does not have (negative: one that
-/// it has too much of): the score of the blur's variance at zero (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948),
-/// with pose, gain and offset unknown. Its own variance is the sum of its squared terms, so that noise of another
-/// size than expected changes nothing. `fit`: the equations there, of least squares at the noise (Robustness{1,
-/// inf, 0}).
+/// Standard deviations by which the residuals show a blur that the prediction lacks (negative: excess blur of the
+/// prediction): score test of the blur's variance at zero (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948), with
+/// pose, gain and offset unknown. The score's variance is the sum of its squared terms, so that an error of the
+/// assumed noise level has no effect. `fit`: the equations there, of least squares at the noise (Robustness{1, inf,
+/// 0}).
 [[nodiscard]] double blur_score(const PhotometricImages& images, const Exposure& exposure,
                                 const PhotometricEquations& fit);
-/// The gradient that a change of the predicted signal, DN, of each pixel would make, were it the measured image's.
+/// Gradient that results if the measured image changes by `change`, DN of predicted signal per pixel.
 [[nodiscard]] Eigen::Matrix<double, 8, 1> response(const PhotometricImages& images, const Exposure& exposure,
                                                    const Robustness& robust, std::span<const float> change);
 

@@ -7,14 +7,14 @@
 namespace narpa {
 namespace {
 
-/// From the sample on the nearer surface to that on the opposite border, grid points.
+/// A line across a pixel, from the sample on the nearer surface to that on the opposite border, grid points.
 struct Side {
     double x, y, dx, dy;
     double jump;  ///< DN, left or upper minus right or lower sample
     const RaySample *near = nullptr, *far = nullptr;
 };
 
-/// The line from a at (x, y) to b; nothing where it adds nothing.
+/// The line from a at (x, y) to b; empty if it contributes nothing.
 std::optional<Side> side_between(const FineGrid& grid, const RaySample& a, const RaySample& b, double x, double y,
                                  double dx, double dy) {
     const double jump = a.signal - b.signal;
@@ -25,7 +25,7 @@ std::optional<Side> side_between(const FineGrid& grid, const RaySample& a, const
     return near_is_a ? Side{x, y, dx, dy, jump, &near, &far} : Side{x + dx, y + dy, -dx, -dy, jump, &near, &far};
 }
 
-/// Calls act(side) for those lines across the square's pixel that add something.
+/// Calls act(side) for those lines across the square's pixel that contribute.
 template <class Do>
 void each_side(const FineGrid& grid, const BorderPoints& points, int column, int row, Do&& act) {
     const int n = grid.fineness, x = (points.square().x + column) * n, y = (points.square().y + row) * n;
@@ -39,11 +39,11 @@ void each_side(const FineGrid& grid, const BorderPoints& points, int column, int
     }
 }
 
-class PixelSides {
+class PixelBorderFlow {
 public:
-    /// Of the square's pixel (column, row). `contours`, `last`: on its sides, in order.
-    PixelSides(const FineGrid& grid, const BorderPoints& points, int column, int row, const RowView& view,
-               std::span<const Contour> contours, std::span<const RaySample> last)
+    /// For the square's pixel (column, row). `contours`, `last`: those on its lines, in order.
+    PixelBorderFlow(const FineGrid& grid, const BorderPoints& points, int column, int row, const RowView& view,
+                    std::span<const Contour> contours, std::span<const RaySample> last)
         : grid_(grid),
           points_(points),
           column_(column),
@@ -77,7 +77,7 @@ public:
     }
 
 private:
-    /// Of the sides across one direction of the image.
+    /// Sums over the lines in one direction of the image.
     struct Jumps {
         double sum = 0, over_range = 0;  ///< DN, DN / m
     };
@@ -89,7 +89,7 @@ private:
         add(side, {0, shift.range_m});
     }
 
-    /// From the nearer sample to the other.
+    /// Adds a line whose change lies at this edge.
     void add(const Side& side, const EdgePlace& edge) {
         if (fine_row_s_ == 0) {
             Jumps& jumps = side.dy == 0 ? across_x_ : across_y_;
@@ -101,7 +101,7 @@ private:
         }
     }
 
-    /// What changes on the surface before its end moves with the surface.
+    /// Changes on the nearer surface before its end move with that surface.
     void add_contour(const Side& side, const Contour& c, const RaySample& last) {
         Side on_surface = side, end = side;
         on_surface.jump = (c.dx + c.dy > 0 ? 1 : -1) * (c.near->signal - last.signal);
@@ -111,8 +111,8 @@ private:
         add(end, {c.middle(), c.range_m});
     }
 
-    /// Where rows are exposed together a velocity is linear in the inverse range, and hardly changes in a pixel
-    /// otherwise: that of its centre.
+    /// If all rows are exposed together, the velocity is linear in the inverse range and otherwise nearly constant
+    /// within a pixel: uses the direction of its centre.
     void add_by_direction() {
         const CameraModel& model = *grid_.frame.model;
         const double middle = 0.5 * (grid_.fineness - 1);
@@ -135,7 +135,7 @@ private:
         const Vec3 a = point - view_.t_camera_target;  // about the target's origin, in camera axes
         const ProjectionJacobian J = model.jacobian(point);
         Vec3 move = horizontal ? J.x : J.y;
-        if (fine_row_s_ != 0) {  // what moves down is exposed later, and has moved on by then
+        if (fine_row_s_ != 0) {  // a point that moves down is exposed later and moves on meanwhile
             const Vec3 v_m_s = view_.motion.velocity_m_s + cross(view_.motion.rate_rad_s, a);
             const Vec3 down = (1 / (1 - dot(J.y, v_m_s) * fine_row_s_)) * J.y;
             move = horizontal ? J.x + dot(J.x, v_m_s) * fine_row_s_ * down : down;
@@ -158,8 +158,8 @@ private:
 
 }  // namespace
 
-SquareSides::SquareSides(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int width,
-                         std::span<const std::uint8_t> chosen)
+TileBorderFlow::TileBorderFlow(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int width,
+                               std::span<const std::uint8_t> chosen)
     : grid_(grid), points_(points) {
     const Square& square = points.square();
     for (int r = 0; r < square.rows; ++r)
@@ -180,10 +180,10 @@ SquareSides::SquareSides(const FineGrid& grid, PointTracer& tracer, const Border
     tracer.trace();
 }
 
-Vector6 SquareSides::flow_over_borders(int column, int row, const RowView& view) const {
+Vector6 TileBorderFlow::flow_over_borders(int column, int row, const RowView& view) const {
     const std::size_t p = pixel(column, row), first = first_[p], n = first_[p + 1] - first;
-    return PixelSides(grid_, points_, column, row, view, std::span(contours_).subspan(first, n),
-                      std::span(last_).subspan(first, n))
+    return PixelBorderFlow(grid_, points_, column, row, view, std::span(contours_).subspan(first, n),
+                           std::span(last_).subspan(first, n))
         .sum();
 }
 

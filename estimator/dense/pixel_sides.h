@@ -1,4 +1,4 @@
-/// estimator/dense/pixel_sides.h - what moves over the borders of a pixel: the first two terms of its derivative.
+/// estimator/dense/pixel_sides.h - flow over the borders of a pixel: the first two terms of its derivative.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,20 @@
 
 namespace narpa {
 
-/// While a row is exposed.
+/// The target as seen while a row is exposed.
 struct RowView {
     Vec3 t_camera_target{};
     ApparentMotion motion{};
-    double row_s = 0;  ///< to the next row
+    double row_s = 0;  ///< time to the next row
 };
 
-/// Of the chosen pixels of a square.
-class SquareSides {
+/// Flow over the borders of a square's chosen pixels.
+class TileBorderFlow {
 public:
-    /// All outlive it. `tracer`: of the same grid as the points. `chosen`: as of BorderPoints::trace. Contours on
-    /// the lines of all these pixels are located side by side.
-    SquareSides(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int width,
-                std::span<const std::uint8_t> chosen);
+    /// All references outlive it. `tracer`: of the same grid as the points. `chosen`: as in BorderPoints::trace.
+    /// Locates the contours on the lines of all these pixels in batches.
+    TileBorderFlow(const FineGrid& grid, PointTracer& tracer, const BorderPoints& points, int width,
+                   std::span<const std::uint8_t> chosen);
     /// Of the square's pixel (column, row): DN per unit of the pose's error, summed over the lines from border to
     /// border (image_derivative.h).
     [[nodiscard]] Vector6 flow_over_borders(int column, int row, const RowView& view) const;
@@ -37,8 +37,8 @@ private:
     const FineGrid& grid_;
     const BorderPoints& points_;
     std::vector<Contour> contours_;
-    std::vector<RaySample> last_;     ///< of each contour's nearer surface, before its end
-    std::vector<std::size_t> first_;  ///< contour of each pixel; the next pixel's is behind its last
+    std::vector<RaySample> last_;     ///< sample on each contour's nearer surface, just before its end
+    std::vector<std::size_t> first_;  ///< index of each pixel's first contour; the next pixel's follows its last
 };
 
 }  // namespace narpa

@@ -11,9 +11,9 @@ namespace {
 /// Neighbouring points of one surface are at most this many times as far apart as its slope predicts.
 constexpr double kSurfaceSteps = 2.5;
 /// Lower limit of the cosine between ray and normal in that prediction.
-constexpr double kLeastCosine = 0.02;
+constexpr double kMinCosine = 0.02;
 
-/// Of a point's tangent plane in the direction of another ray.
+/// Inverse range of a point's tangent plane along another ray.
 double inverse_range_towards(const RaySample& point, const Vec3& direction) {
     return dot(point.normal, direction) / (point.range_m * dot(point.normal, point.ray_direction));
 }
@@ -41,7 +41,7 @@ void aim_through(const Frame& f, const Lanes<double>& x, const Lanes<double>& y,
 bool is_contour(const RaySample& a, const RaySample& b) {
     if (a.body != b.body) return true;
     const double cosine = std::max(
-        std::min(std::abs(dot(a.normal, a.ray_direction)), std::abs(dot(b.normal, b.ray_direction))), kLeastCosine);
+        std::min(std::abs(dot(a.normal, a.ray_direction)), std::abs(dot(b.normal, b.ray_direction))), kMinCosine);
     const double range_m = kSurfaceSteps * std::max(a.range_m, b.range_m);
     const Vec3 apart = a.position - b.position, turn = a.ray_direction - b.ray_direction;
     return dot(apart, apart) * cosine * cosine > range_m * range_m * dot(turn, turn);

@@ -1,4 +1,4 @@
-/// estimator/dense/surface_edges.h - where on a line across the image what is seen changes.
+/// estimator/dense/surface_edges.h - finds edges on a line across the image.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace narpa {
 
-/// The first hit of one ray. None: body -1, infinite range.
+/// The first hit of one ray. No hit: body -1, infinite range.
 struct RaySample {
     double signal = 0;  ///< DN above black
     int body = -1;
@@ -15,23 +15,23 @@ struct RaySample {
     Vec3 position{}, normal{}, ray_direction{};  ///< world
 };
 
-/// Through a point of the image, in the middle of its row's exposure.
+/// Ray through a point of the image, in the middle of its row's exposure.
 [[nodiscard]] Ray ray_through(const Frame& f, double x, double y);
 
-/// The same through `rays.n` points.
+/// Rays through `rays.n` points.
 void aim_through(const Frame& f, const Lanes<double>& x, const Lanes<double>& y, RayBatch& rays);
 
-/// True where the two are not points of one surface, by the slopes from their normals.
+/// True if the two are not points of one surface, by the slopes from their normals.
 [[nodiscard]] bool is_contour(const RaySample& a, const RaySample& b);
 
-/// Of a line between two points: where on it, from 0 to 1, and at what range.
+/// Position of an edge on the line between two points, 0 to 1, and its range.
 struct EdgePlace {
     double along, range_m;
 };
 
-/// Where what changes between two points of one surface lies: at the crease in which their tangent planes meet, if
-/// that is between them; else in the middle, on average. Along a line of sight the creases of a face seen edge-on
-/// may be as far apart as it is long.
+/// Edge between two points of one surface: the crease where their tangent planes meet, if that is between them;
+/// else the midpoint, which is right on average. Along a line of sight the creases of a face seen edge-on may be as
+/// far apart as the face is long.
 [[nodiscard]] EdgePlace edge_between(const RaySample& a, const RaySample& b);
 
 /// The end of a surface in front of another, or of nothing, on a line between two points of the image.
@@ -42,7 +42,7 @@ struct Contour {
     double on_near = 0, on_far = 1;  ///< the end is between them
     [[nodiscard]] double middle() const { return 0.5 * (on_near + on_far); }
 };
-/// Finds their ends by so many bisections, side by side.
+/// Locates the contours by this many bisections, in batches.
 void bisect(const Frame& f, std::span<Contour> contours, int halvings);
 
 }  // namespace narpa

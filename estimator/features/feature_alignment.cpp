@@ -17,33 +17,32 @@ namespace {
 
 /// A match whose residual exceeds this many times the median is an outlier.
 constexpr double kOutlier = 4;
-/// Neighbouring rays this far off must meet the surface that the feature's own ray met.
+/// A feature is on a smooth surface if rays this far beside it meet the same surface,
 constexpr double kNeighbour_px = 1.5;
-/// They may lie off its tangent plane by this many pixels' worth of depth: a bend is a corner, a step is an
-/// outline.
+/// off its tangent plane by at most this many pixels' worth of depth: a bend is a corner, a step is an outline.
 constexpr double kStep_px = 6;
 
-/// Fewer degrees of freedom of the residuals say nothing of their scatter.
+/// With fewer degrees of freedom the residuals do not determine their scatter.
 constexpr double kFewestFreedom = 3;
-/// Steps of a smaller normalised square are noise: each view selects other features.
+/// Steps with a smaller squared Mahalanobis length are noise, as each view selects other features.
 constexpr double kSettledSquared = 9;
 /// RMS motion in the image by which the response is measured.
 constexpr double kMoved_px = 2;
-/// From this number of matches on most are of points of the body, and the response is not measured.
+/// With at least this many matches most are of points on the body, and the response is not measured.
 constexpr int kMany = 30;
-/// Matches that were nearer to a guess than this, RMS, need no second start.
+/// If the matches are nearer to the guess than this (RMS), no second start is needed.
 constexpr double kNear_px = 2 * kMoved_px;
-/// Fewer flows do not say what motion they show.
+/// Fewer flows do not determine a motion.
 constexpr std::size_t kFewestFlows = 5;
-/// Answers from two starts whose distance has a larger normalised square are two poses.
+/// Answers from two starts with a larger squared Mahalanobis distance are two poses.
 constexpr double kSameSquared = 30;
-/// Views whose light differs from the frame's by more than this part are scaled to it: optical flow takes every
-/// difference for motion. A match with a ratio above kMostGain is a wrong one.
-constexpr double kSameLight = 0.01, kMostGain = 3;
+/// Views whose light differs from the frame's by more than this part are scaled to it, as optical flow takes any
+/// difference for motion. A match with a ratio above kMaxGain is wrong.
+constexpr double kSameLight = 0.01, kMaxGain = 3;
 /// Side of the blocks in which the target is searched.
 constexpr int kBlock_px = 6;
 
-/// More than half of a match's window is clipped in the frame: its gradients are not the light's.
+/// True if more than half of a match's window is clipped in the frame, so that its gradients are not the light's.
 bool is_clipped(const MeasuredImage& frame, double u, double v) {
     if (frame.clipped.empty()) return false;
     const int x0 = static_cast<int>(std::lround(u)), y0 = static_cast<int>(std::lround(v));
@@ -58,8 +57,8 @@ bool is_clipped(const MeasuredImage& frame, double u, double v) {
     return 2 * clipped > all;
 }
 
-/// The motion of the target that these flows between two views look like, if all are of points of the body. Zero
-/// with too few of them.
+/// The motion of the target that best explains these flows between two views, if all are of points on the body.
+/// Zero for too few of them.
 Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& jacobians, double floor_px,
                      std::vector<FeatureMatch> flows) {
     constexpr int kRounds = 3;  // the first two find outliers
@@ -79,9 +78,9 @@ Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& ja
         motion = ldlt_solve(H, gradient);
         std::vector<double> lengths;
         for (const FeatureMatch& m : flows) lengths.push_back((jacobians[m.point] * motion - flow(m)).norm());
-        const double most_px = kOutlier * scale_of(lengths);
+        const double max_px = kOutlier * scale_of(lengths);
         std::erase_if(
-            flows, [&](const FeatureMatch& m) { return (jacobians[m.point] * motion - flow(m)).norm() > most_px; });
+            flows, [&](const FeatureMatch& m) { return (jacobians[m.point] * motion - flow(m)).norm() > max_px; });
     }
     return motion;
 }
@@ -107,7 +106,7 @@ void FeatureAlignment::set_detector(const Detector& detector) {
     times_ = row_times(camera);
 }
 
-/// The rays of lanes 1 to 4 meet the surface that lane 0 meets.
+/// True if the rays of lanes 1 to 4 meet the surface that lane 0 meets.
 bool FeatureAlignment::on_smooth_surface(const HitBatch& hits) const {
     const Hit hit = hits[0];
     const double step_m = kStep_px * hit.range_m / CameraModelHandle(view_.camera())->pixels_per_radian();
@@ -121,7 +120,7 @@ bool FeatureAlignment::on_smooth_surface(const HitBatch& hits) const {
     return true;
 }
 
-/// Where features are looked for: blocks of pixels whose centre shows the target.
+/// Marks the blocks of pixels in which features are searched: those whose centre shows the target.
 void FeatureAlignment::find_target() {
     const int width = view_.camera().width, height = view_.camera().height;
     constexpr double kCentre = 0.5 * (kBlock_px - 1);
@@ -162,13 +161,13 @@ double FeatureAlignment::gain_about(const std::vector<FeatureMatch>& matches, co
         const double in_frame =
             sum(m.frame_u, m.frame_v, [&](std::size_t p) { return static_cast<double>(frame.dn[p]); });
         const double in_view = sum(m.view_u, m.view_v, [&](std::size_t p) { return sensor_.dn(view.pixels[p]); });
-        if (in_view > 0) gains.push_back(std::clamp(in_frame / in_view, 1 / kMostGain, kMostGain));
+        if (in_view > 0) gains.push_back(std::clamp(in_frame / in_view, 1 / kMaxGain, kMaxGain));
     }
     return gains.empty() ? 1 : upper_median(std::span(gains));
 }
 
-/// Features of the view as it was rendered last that lie on the target, and where the frame has them. `gain`: of
-/// the frame's light over the view's, as found in the view before.
+/// Matches features on the target in the last rendered view with the frame. `gain`: ratio of the frame's light to
+/// the view's, as found in the previous view.
 void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
                               double& gain, ModelMatches& points) {
     points = {};
@@ -206,8 +205,8 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
     }
 }
 
-/// What matches show of the motions that they hold least, from the pose of the last view: these themselves where
-/// all are of points of the body. Outlines and shading do not move with it, and matches slide along edges.
+/// Response of the matches to the least observed motions, from the pose of the last view: the identity if all are
+/// of points on the body. Outlines and shading do not move with the body, and matches slide along edges.
 Matrix6 FeatureAlignment::response(const ModelMatches& points, const ByteScale& scale,
                                    const FrameSettings& settings, const Rigid3& T_camera_target,
                                    const Matrix6& covariance, double floor_px) {
@@ -245,8 +244,8 @@ PoseShifts FeatureAlignment::shifts_by_light(const ModelMatches& points, const B
     return shifts;
 }
 
-/// Outlines, and edges along which a match can slide, hold answers near where they started. So a start beyond the
-/// answer, as far as the guess is before it, must lead to it; what the two are apart is part of the error.
+/// Outlines, and edges along which a match can slide, hold answers near their start. So a second start, the guess
+/// mirrored in the answer, must lead to it too; the distance between the two answers is part of the error.
 void FeatureAlignment::compare_with_mirrored(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                              const ApparentMotion& motion, FeatureEstimate& e, Fit& fit) {
     if (e.rounds.front().before_px < kNear_px) return;
@@ -353,7 +352,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         floor_px = points.floor_px(camera, fit.T_camera_body, freedom);
         const Matrix6& C = fit.covariance;
         estimate.covariance = C + C * points.sums(camera, fit.T_camera_body, floor_px).shared * C;
-        // The scatter is estimated from so many numbers (Student 1908).
+        // Student's t: the scatter is estimated from few residuals (Student 1908).
         estimate.covariance *= freedom / (freedom - 2);
         estimate.covariance *= points.inflation(camera, fit.T_camera_body, C, estimate.covariance, floor_px);
         estimate.status = FeatureStatus::unsettled;
@@ -362,7 +361,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
             estimate.status = FeatureStatus::settled;
             break;
         }
-        // Where the views end, what the pose still moves by is part of its error.
+        // After the last view the pose's remaining motion is part of its error.
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;

@@ -21,11 +21,11 @@ namespace narpa {
 struct FeatureSettings {
     int features = 400;        ///< detected in the view, at most
     int renders_max = 10;      ///< views rendered for a frame
-    double settled_px = 0.02;  ///< converged: a solution that moves the points by less (RMS)
+    double settled_px = 0.02;  ///< converged: a solution moves the points by less (RMS)
     int spp = 4;               ///< of the views
-    int spp_over_time = 16;    ///< the same where each row is exposed over time: a sample sees one moment
+    int spp_over_time = 16;    ///< the same if rows are exposed over time: each sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
-    double floor_most_px = 1;  ///< refused where matches scatter by more: the model is not what the frame shows
+    double floor_most_px = 1;  ///< refused if matches scatter by more: the frame does not show the model
     ModelUncertainty model{};  ///< albedo is not used, as views are scaled to the frame's light
 };
 
@@ -40,21 +40,21 @@ inline constexpr int kFewestMatches = 8;
 
 /// One view rendered and compared.
 struct FeatureRound {
-    double before_px = 0, after_px = 0;  ///< distance of agreeing matches, RMS, at the guess and at the solution
+    double before_px = 0, after_px = 0;  ///< RMS distance of the inlier matches at the guess and at the solution
 };
 
 struct FeatureEstimate {
     FeatureStatus status = FeatureStatus::few_matches;
     Rigid3 T_camera_target{};
-    /// From the sensor's noise and the excess scatter of the matches, both correlated between matches whose windows
-    /// overlap, in proportion to the overlap, and larger where matches show less of a motion than points of the
-    /// body would; from the distance to the answer of a second start; and from the model's uncertainty.
+    /// From the sensor's noise and the excess scatter of the matches, both correlated between matches in proportion
+    /// to the overlap of their windows, and enlarged where matches respond less to a motion than points on the body
+    /// would; plus the distance between the answers of two starts, plus the model's uncertainty.
     Matrix6 covariance = Matrix6::Zero();
-    Matrix6 covariance_of_model = Matrix6::Zero();  ///< the last part, which is the same in all frames
+    Matrix6 covariance_of_model = Matrix6::Zero();  ///< part of the model's uncertainty, common to all frames
     /// Cramer-Rao for these points with the sensor's noise and the model's uncertainty alone.
     Matrix6 bound = Matrix6::Zero();
     int agreeing = 0;
-    double floor_px = 0;                 ///< of the matches: their scatter beyond the sensor's noise
+    double floor_px = 0;                 ///< scatter of the matches beyond the sensor's noise
     std::vector<FeatureRound> rounds;    ///< from the guess
     Vector6 by_focal = Vector6::Zero();  ///< shift of the pose (pnp_refine.h)
     PoseShifts by_light{6, 0};           ///< by the light's direction, turned about each of the target's axes
@@ -65,10 +65,10 @@ struct FeatureEstimate {
     }
 };
 
-/// Keeps its memory from frame to frame.
+/// Reuses its memory from frame to frame.
 class FeatureAlignment {
 public:
-    /// `render_scene` outlives it. `target`: index of the body. `at`: as of ModelView.
+    /// `render_scene` outlives it. `target`: index of the body. `at`: as for ModelView.
     FeatureAlignment(const RenderScene& render_scene, const Camera& camera, std::size_t target, const BodyPoses& at,
                      const FeatureSettings& settings = {});
 
@@ -86,12 +86,13 @@ private:
     void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale, double& gain,
                 ModelMatches& points);
     void find_target();
-    /// How much more light the frame has than the view about these matches: median of their windows; 1 without any.
+    /// Ratio of the frame's light to the view's about these matches: median over their windows; 1 without any.
     [[nodiscard]] double gain_about(const std::vector<FeatureMatch>& matches, const MeasuredImage& frame) const;
     [[nodiscard]] Matrix6 response(const ModelMatches& points, const ByteScale& scale,
                                    const FrameSettings& settings, const Rigid3& T_camera_target,
                                    const Matrix6& covariance, double floor_px);
-    /// What matches show of a light that is turned by its uncertainty, against the view at this pose.
+    /// Shifts of the pose that matches show when the light is rotated by its uncertainty, for the view at this
+    /// pose.
     [[nodiscard]] PoseShifts shifts_by_light(const ModelMatches& points, const ByteScale& scale,
                                              const FrameSettings& settings, const Rigid3& T_camera_target,
                                              const BodyPoses& at, const ApparentMotion& motion, double floor_px);

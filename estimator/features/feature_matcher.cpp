@@ -14,7 +14,7 @@ constexpr float kRoundTrip_px = 0.5f;
 constexpr int kFlowWindow_px = 2 * kFlowHalfWindow_px + 1, kFlowLevels = 4;
 /// Part of the frame's pixels that may be brighter than the top of the scale.
 constexpr double kBeyondTop = 0.002;
-/// Of rounding to whole steps.
+/// Variance of rounding to whole steps.
 constexpr double kRoundingVariance = 1.0 / 12;
 
 cv::Mat as_mat(const ByteImage& image) {
@@ -117,7 +117,7 @@ Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame, c
             const int there_u = std::clamp(frame_u + du, 0, frame.width - 1),
                       there_v = std::clamp(frame_v + dv, 0, frame.height - 1);
             const double variance = static_cast<double>(frame.variance[index(frame, there_u, there_v)]) +
-                                    kRoundingVariance;  // the view's too
+                                    kRoundingVariance;  // rounding of the view
             G += g * g.transpose();
             of_noise += variance * g * g.transpose();
         }

@@ -16,16 +16,16 @@ namespace narpa {
 
 /// Eight bits a pixel, row-major, linear in the light.
 ///
-/// No tone curve: a pixel of an edge is the mean of a few samples, and what a curve makes of it depends on how many
-/// they are. Edges of views of four samples and of frames of one were 0.1 px apart in square roots of the light,
-/// and poses too far away by 3e-4 of the range.
+/// No tone curve: an edge pixel is the mean of a few samples, and the result of a curve depends on their number.
+/// With square roots of the light, edges in views of four samples and in frames of one were 0.1 px apart, and poses
+/// too far away by 3e-4 of the range.
 struct ByteImage {
     int width = 0, height = 0;
     std::vector<std::uint8_t> pixels;
-    std::vector<float> variance{};  ///< of each pixel, steps^2; empty: of a view, whose noise is not known
+    std::vector<float> variance{};  ///< of each pixel, steps^2; empty: a view, whose noise is not known
 };
 
-/// The scale of a frame and of the views that it is compared with.
+/// Common scale of a frame and of the views that it is compared with.
 class ByteScale {
 public:
     /// 255 is nearly the brightest DN of the frame.
@@ -33,7 +33,7 @@ public:
 
     /// With the variances of sensor noise and of rounding to eight bits.
     [[nodiscard]] ByteImage scaled(const MeasuredImage& frame) const;
-    /// `gain`: how much more light the frame has than the view.
+    /// `gain`: ratio of the frame's light to the view's.
     [[nodiscard]] ByteImage scaled(const RadianceImage& view, double gain = 1) const;
 
 private:
@@ -50,7 +50,7 @@ struct FeatureMatch {
     std::size_t point = 0;  ///< which of the points tracked
 };
 
-/// While it exists OpenCV uses the calling threads alone, in the whole process; then as many as before.
+/// During its lifetime OpenCV uses only the calling threads, in the whole process; then as many as before.
 class SingleThreadedOpenCv {
 public:
     SingleThreadedOpenCv();

@@ -27,7 +27,7 @@ double distance_px(const Pixel& a, const Pixel& b) {
     return std::hypot(a.u - b.u, a.v - b.v);
 }
 
-/// Part of a window's side that it shares with another so far away.
+/// Part of a window's side that overlaps with another window at this distance.
 double overlap(double distance) {
     return std::max(0.0, 1 - std::abs(distance) / (2 * kFlowHalfWindow_px + 1));
 }

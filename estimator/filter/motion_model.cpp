@@ -11,10 +11,10 @@
 namespace narpa {
 namespace {
 
-/// Of a turn that one step of a tumbling body makes: the fourth-order steps are good to 1e-9 of it.
+/// Largest rotation of a tumbling body in one step: the fourth-order steps have a relative error of 1e-9 then.
 constexpr double kTumbleStepRad = 0.02;
 
-/// Of (position, velocity).
+/// System matrix of (position, velocity).
 Matrix6 translation_rates(const MotionModel& model) {
     const double n = model.orbit_rate_rad_s;
     Matrix6 F = Matrix6::Zero();
@@ -30,14 +30,14 @@ Matrix6 translation_rates(const MotionModel& model) {
     return F;
 }
 
-/// White noise on the last three of six.
+/// Spectral density of white noise on the last three of six states.
 Matrix6 driven(double psd) {
     Matrix6 Qc = Matrix6::Zero();
     Qc.bottomRightCorner<3, 3>() = psd * Eigen::Matrix3d::Identity();
     return Qc;
 }
 
-/// Errors of (attitude, rate), target axes.
+/// System matrix of the errors of (attitude, rate), target axes.
 Matrix6 rotation_rates(const Eigen::Vector3d& w) {
     Matrix6 F = Matrix6::Zero();
     F.topLeftCorner<3, 3>() = -skew(w);
@@ -135,7 +135,7 @@ void propagate(const MotionModel& model, double dt_s, const Vec3& acceleration_m
     x << to_eigen(state.position_m), to_eigen(state.velocity_m_s);
     driving.tail<3>() = to_eigen(acceleration_m_s2);
     if (model.ground)
-        driving.tail<3>() -= to_eigen(model.ground->gravity_m_s2);  // the chaser falls, not the target
+        driving.tail<3>() -= to_eigen(model.ground->gravity_m_s2);  // the chaser falls, the target does not
     x = (moving.transition * x + moving.integral * driving).eval();
     state.position_m = {x[0], x[1], x[2]};
     state.velocity_m_s = {x[3], x[4], x[5]};

@@ -1,8 +1,8 @@
 /// estimator/filter/motion_model.h - relative motion of a target and a chaser: propagation of state and covariance.
 ///
 /// The frame is either inertial or LVLH, that of W. Clohessy and R. Wiltshire (1960): x up, away from the Earth, y
-/// along the circular orbit, z along its momentum; it turns about z with the orbit's rate. The chaser is its
-/// origin. Over the ground of a planet it turns with the planet, whose axis is z.
+/// along the circular orbit, z along its angular momentum; it rotates about z with the orbit's rate. Its origin is
+/// the chaser. Over a planet's ground the frame rotates with the planet, whose axis is z.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,8 @@ struct RelativeState {
 /// positive definite.
 [[nodiscard]] double normalised_error_squared(const Vector12& error, const Matrix12& covariance);
 
-/// Where the target is ground that the chaser falls to: gravity and centrifugal force, linear about the target.
+/// For a target that is ground to which the chaser falls: gravity plus centrifugal acceleration, linear about the
+/// target.
 struct GroundField {
     Vec3 gravity_m_s2{};                                    ///< at the target, frame axes
     Eigen::Matrix3d gradient_s2 = Eigen::Matrix3d::Zero();  ///< change of `gravity_m_s2` with the chaser's position
@@ -45,8 +46,8 @@ struct MotionModel {
     /// with `ground` the planet's rotation.
     double orbit_rate_rad_s = 0;
     std::optional<GroundField> ground{};
-    /// The target's, about its centre of mass in its body axes: it tumbles as a rigid body without a torque. None:
-    /// its rate stays as it is in its own axes.
+    /// Inertia of the target about its centre of mass in its body axes: it tumbles as a rigid body without a
+    /// torque. None: its rate is constant in its own axes.
     std::optional<Eigen::Matrix3d> inertia_kg_m2{};
     /// Process noise: power spectral densities of white noise, on each axis, of acceleration
     /// (m^2 s^-3) and of angular acceleration (rad^2 s^-3).
@@ -71,7 +72,8 @@ struct RotationStep {
 void propagate(const MotionModel& model, double dt_s, const Vec3& acceleration_m_s2, RelativeState& state,
                Matrix12& covariance);
 
-/// Of (position, velocity) under Clohessy and Wiltshire's equations, in closed form. orbit_rate_rad_s > 0.
+/// Transition matrix of (position, velocity) under Clohessy and Wiltshire's equations, closed form.
+/// orbit_rate_rad_s > 0.
 [[nodiscard]] Matrix6 clohessy_wiltshire_transition(double orbit_rate_rad_s, double dt_s);
 
 }  // namespace narpa

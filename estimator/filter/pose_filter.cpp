@@ -24,7 +24,7 @@ bool is_covariance(const Eigen::Matrix<double, N, N>& C) {
     return normalised_error_squared(Eigen::Matrix<double, N, 1>::Zero(), C) == 0;
 }
 
-/// What is wrong with it; null: nothing.
+/// Text on what is wrong with a measurement; null: nothing.
 const char* fault(const PoseMeasurement& m) {
     if (!is_finite(m.T_sensor_target.t) || !is_finite(m.T_chaser_sensor.t)) return "expected finite positions";
     if (!is_unit(m.T_sensor_target.q) || !is_unit(m.T_chaser_sensor.q) || !is_unit(m.q_frame_chaser))
@@ -56,14 +56,14 @@ const char* fault(const BeamRange& m) {
     return nullptr;
 }
 
-/// Of a measurement that observes all six motions; else 0.
+/// Covariance of a measurement that observes all six motions; else 0.
 Matrix6 covariance_of(const PoseMeasurement& m) {
     if (!m.root_information) return m.covariance;
     const Matrix6 root = inverse(*m.root_information);
     return root.allFinite() ? Matrix6(root * root.transpose()) : Matrix6(Matrix6::Zero());
 }
 
-/// Where the sensor's axes are in the frame.
+/// Rotation from sensor axes to frame axes.
 Quat q_frame_sensor(const PoseMeasurement& m) {
     return m.q_frame_chaser * m.T_chaser_sensor.q;
 }
@@ -74,7 +74,7 @@ Rigid3 expected_pose(const RelativeState& state, const PoseMeasurement& m) {
     return inverse(m.T_chaser_sensor) * T_chaser_target;
 }
 
-/// How the error of a pose in axes that q_frame_axes turns to the frame's depends on that of the state.
+/// Jacobian of a pose's error by the state's error; q_frame_axes takes the pose's axes to the frame's.
 Matrix6x12 pose_jacobian(const Quat& q_frame_axes, const RelativeState& state) {
     Matrix6x12 H = Matrix6x12::Zero();
     H.block<3, 3>(0, 6) = rotation_matrix(conjugate(q_frame_axes) * state.q_frame_target);
@@ -82,7 +82,7 @@ Matrix6x12 pose_jacobian(const Quat& q_frame_axes, const RelativeState& state) {
     return H;
 }
 
-/// The velocity that the state expects along the beam, and how it depends on the state's error.
+/// Expected velocity along the beam, and its Jacobian by the state's error.
 ///
 /// With w the frame's rate, W the target's, V the chaser's, L from the target's centre of mass to the point, all in
 /// frame axes: u . (v + w x r + W x L - V x o).
@@ -102,8 +102,8 @@ std::pair<double, Eigen::Matrix<double, 1, 12>> expected_velocity(const Relative
     return {velocity, H};
 }
 
-/// The range that the state expects along the beam, and how it depends on the state's error. With n the plane's
-/// normal, c its point from the target's centre of mass, r that centre, all in frame axes: n . (r + c - o) / n . u.
+/// Expected range along the beam, and its Jacobian by the state's error. With n the plane's normal, c its point
+/// from the target's centre of mass, r that centre, all in frame axes: n . (r + c - o) / n . u.
 std::pair<double, Eigen::Matrix<double, 1, 12>> expected_range(const RelativeState& state, const BeamRange& m) {
     const Vec3 u = m.q_frame_chaser * m.direction, origin = m.q_frame_chaser * m.origin_m;
     const Vec3 n = state.q_frame_target * m.normal, plane = state.q_frame_target * m.point_m;
@@ -151,7 +151,7 @@ Innovation<6> innovation_of(const MotionModel&, const RelativeState& state, cons
     Innovation<6> i{.H = pose_jacobian(q_frame_sensor(m), state),
                     .z = error_between(expected_pose(state, m), m.T_sensor_target),
                     .R = m.covariance};
-    if (m.root_information) {  // S is at least 1
+    if (m.root_information) {  // whitened: S is at least 1
         i.H = (*m.root_information * i.H).eval();
         i.z = (*m.root_information * i.z).eval();
         i.R.setIdentity();
@@ -179,12 +179,12 @@ Innovation<1> innovation_of(const MotionModel&, const RelativeState& state, cons
     return i;
 }
 
-/// The covariance of A e, given that of e.
+/// A C A': the covariance of A e, given that of e.
 Matrix12 carried(const Matrix12& A, const Matrix12& covariance) {
     return A * covariance * A.transpose();
 }
 
-/// `taken`: K H, the part of the state that the measurement replaces; `noise`: K R K', what it adds.
+/// `taken`: K H, the part of the state that the measurement replaces; `noise`: K R K', the measurement's own noise.
 void correct(const Vector12& step, const Matrix12& taken, const Matrix12& noise, RelativeState& state,
              Matrix12& P) {
     state = displaced(state, step);
@@ -258,7 +258,7 @@ PoseFilter::Estimate PoseFilter::propagated(Estimate from, const Thrust& thrust,
     return from;
 }
 
-/// Drops the oldest where the history is full.
+/// Drops the oldest event if the history is full.
 void PoseFilter::insert(std::size_t place, const Event& event) {
     if (history_.size() == settings_.history) {
         std::move(history_.begin() + 1, history_.begin() + static_cast<std::ptrdiff_t>(place), history_.begin());
@@ -281,7 +281,7 @@ std::size_t PoseFilter::first_after(std::int64_t t_ns) const {
     return static_cast<std::size_t>(later - history_.begin());
 }
 
-/// Events from `place` on once more, after a change before them.
+/// Repeats the events from `place` on, after a change before them.
 void PoseFilter::repeat_from(std::size_t place) {
     for (std::size_t i = place; i < history_.size(); ++i) {
         Event& e = history_[i];

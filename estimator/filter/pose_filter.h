@@ -23,7 +23,7 @@ struct FilterSettings {
     double gate = 27.86;
     /// The same for velocity or range along a beam, one degree of freedom.
     double beam_gate = 15.14;
-    /// Measurements and changes of the known acceleration that are kept for late measurements; >= 2.
+    /// Measurements and changes of the known acceleration that are kept, to insert late measurements; >= 2.
     std::size_t history = 32;
 };
 
@@ -34,8 +34,8 @@ struct PoseMeasurement {
     Matrix6 covariance = Matrix6::Zero();  ///< of its error (pose_estimate.h): sensor axes, positive definite
     Rigid3 T_chaser_sensor{};              ///< how the sensor is mounted
     Quat q_frame_chaser{};                 ///< the chaser's attitude then, taken as exact
-    /// In place of `covariance` where motions are not observed (root_information.h). The NIS then has a degree of
-    /// freedom less for each of them. It starts no filter unless it observes all six.
+    /// Replaces `covariance` if some motions are not observed (root_information.h). Each of them reduces the NIS's
+    /// degrees of freedom by one. It starts no filter unless it observes all six.
     std::optional<Matrix6> root_information{};
 };
 
@@ -45,15 +45,16 @@ struct BeamVelocity {
     /// Chaser axes, from its centre of mass: where the beam starts, its unit direction, and where it meets the
     /// target (origin + range * direction).
     Vec3 origin_m{}, direction{}, point_m{};
-    /// Of the target's material point there minus that of the beam's origin, along the beam: receding is positive.
+    /// Velocity of the target's material point there minus that of the beam's origin, along the beam; receding:
+    /// positive.
     double velocity_m_s = 0;
     double sigma_m_s = 0;      ///< standard deviation, > 0
     Quat q_frame_chaser{};     ///< the chaser's attitude then, taken as exact
     Vec3 chaser_rate_rad_s{};  ///< against inertial space, chaser axes, taken as exact
 };
 
-/// An altimeter's measurement of the range along a beam. The target's surface is a plane about where the beam is
-/// expected to meet it.
+/// An altimeter's measurement of the range along a beam. The target's surface is taken as a plane about the beam's
+/// expected hit.
 struct BeamRange {
     std::int64_t t_ns = 0;
     Vec3 origin_m{},
@@ -79,7 +80,7 @@ struct UpdateResult {
 
 struct UpdateCounts {
     std::uint64_t taken = 0, late = 0, gated = 0, too_late = 0, bad = 0;  ///< late: of those taken, into the past
-    std::uint64_t gated_in_a_row = 0;  ///< poses since the last that was taken: many mean that the filter is lost
+    std::uint64_t gated_in_a_row = 0;  ///< poses gated since the last one taken: many mean divergence
 };
 
 class PoseFilter {
@@ -93,15 +94,14 @@ public:
     static Result<PoseFilter> create(const FilterSettings& settings, const PoseMeasurement& first,
                                      double velocity_sigma_m_s, double rate_sigma_rad_s);
 
-    // What follows allocates and throws nothing.
+    // The functions below neither allocate nor throw.
 
     /// Propagates to t_ns; an earlier time changes nothing.
     void predict(std::int64_t t_ns);
-    /// Known acceleration of the target relative to the chaser, frame axes, from t_ns on in place of what was known
-    /// before: minus that of the chaser's thrusters. Propagates to t_ns; where that is earlier than the filter's
-    /// time, what came since is repeated. `psd`: white noise on each axis in addition to the motion model's, for
-    /// the uncertainty of the thrust (m^2 s^-3). Returns false, without effect, unless finite and psd >= 0, and
-    /// t_ns not older than what the filter remembers.
+    /// Sets the known acceleration of the target relative to the chaser, frame axes, from t_ns on: minus that of
+    /// the chaser's thrusters. Propagates to t_ns; if that is before the filter's time, later events are repeated.
+    /// `psd`: white noise on each axis in addition to the motion model's, for the uncertainty of the thrust (m^2
+    /// s^-3). Returns false, without effect, unless finite and psd >= 0, and t_ns is within the history.
     bool accelerate(std::int64_t t_ns, const Vec3& acceleration_m_s2, double psd = 0);
     /// Updates with a measurement; propagates to its time where that is later.
     UpdateResult update(const PoseMeasurement& measurement);
@@ -110,7 +110,7 @@ public:
 
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_; }
     [[nodiscard]] const RelativeState& state() const noexcept { return now_.state; }
-    /// Of the state's error (motion_model.h).
+    /// Covariance of the state's error (motion_model.h).
     [[nodiscard]] const Matrix12& covariance() const noexcept { return now_.covariance; }
     [[nodiscard]] const UpdateCounts& counts() const noexcept { return counts_; }
 
@@ -153,7 +153,7 @@ private:
     FilterSettings settings_;
     std::int64_t t_ns_ = 0;
     Estimate now_;
-    std::vector<Event> history_;  ///< by time; the last is what `now_` comes from
+    std::vector<Event> history_;  ///< in order of time; `now_` is propagated from the last
     UpdateCounts counts_;
 };
 
@@ -161,7 +161,7 @@ struct PoseTrackerSettings {
     FilterSettings filter{};
     /// Standard deviations of velocity and rate, about zero, where the filter starts from a measurement.
     double first_velocity_m_s = 1, first_rate_rad_s = 0.1;
-    /// So many gated measurements in a row mean that the filter is wrong, not they.
+    /// After this many consecutive gated measurements the filter restarts: the filter is taken to be wrong.
     std::uint64_t gated_in_a_row = 5;
 };
 
@@ -180,10 +180,10 @@ public:
     void stop() noexcept { filter_.reset(); }
 
     [[nodiscard]] bool started() const noexcept { return filter_.has_value(); }
-    /// Once it has started.
+    /// Requires started().
     [[nodiscard]] PoseFilter& filter() noexcept { return *filter_; }
     [[nodiscard]] const PoseFilter& filter() const noexcept { return *filter_; }
-    /// After measurements that contradicted it.
+    /// Number of restarts after measurements that contradicted the filter.
     [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
 
 private:

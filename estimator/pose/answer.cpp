@@ -12,13 +12,13 @@
 namespace narpa {
 namespace {
 
-/// Of a pose that is observed: so many standard deviations further from the guess than that can be off.
+/// Standard deviations by which an observed pose may be further from the guess than the guess's largest error.
 constexpr double kBeyondGuess_sigmas = 2;
 
-/// Takes motions in units of the limits to (rotation rad, translation m).
+/// Scale factors from motions in units of the limits to (rotation rad, translation m).
 Vector6 limits(double range_m) {
     Vector6 most;
-    most << Eigen::Vector3d::Constant(kMostRotation_rad), Eigen::Vector3d::Constant(kMostTranslation * range_m);
+    most << Eigen::Vector3d::Constant(kMaxRotation_rad), Eigen::Vector3d::Constant(kMaxTranslation * range_m);
     return most;
 }
 
@@ -28,7 +28,7 @@ double sigma_along(const Eigen::Vector3d& shift, const Eigen::Matrix3d& covarian
     return std::sqrt(std::max(0.0, direction.dot(covariance * direction)));
 }
 
-/// Largest distance from the guess, rad and m.
+/// Largest accepted distance from the guess, rad and m.
 std::array<double, 2> farthest(const Fit& fit) {
     const bool observed = fit.observability.unobserved == 0;
     const GuessError most = observed ? fit.guess_error : GuessError{};
@@ -38,7 +38,7 @@ std::array<double, 2> farthest(const Fit& fit) {
                 sigmas * sigma_along(fit.moved.tail<3>(), fit.covariance.bottomRightCorner<3, 3>())};
 }
 
-std::string in_words(const Observability& o) {
+std::string to_text(const Observability& o) {
     return fmt::format("{} of six motions not observed", o.unobserved);
 }
 
@@ -51,15 +51,15 @@ Answer judge(Fit fit) {
     answer.rivals = std::move(fit.rivals);
     answer.why.clear();
     const double turn = fit.moved.head<3>().norm(), shift = fit.moved.tail<3>().norm();
-    const auto [most_turn, most_shift] = farthest(fit);
+    const auto [max_turn, max_shift] = farthest(fit);
     if (!fit.failed.empty()) {
         answer.why = std::move(fit.failed);
-    } else if (!(fit.residual <= fit.residual_most)) {
+    } else if (!(fit.residual <= fit.residual_max)) {
         answer.why = fmt::format("residuals are {:.3g} times what noise explains, expected at most {:.3g}",
-                                 fit.residual, fit.residual_most);
-    } else if (turn > most_turn || shift > most_shift) {
+                                 fit.residual, fit.residual_max);
+    } else if (turn > max_turn || shift > max_shift) {
         answer.why = fmt::format("{:.3g} deg and {:.3g} m from the guess, expected at most {:.3g} deg and {:.3g} m",
-                                 turn / kDegree, shift, most_turn / kDegree, most_shift);
+                                 turn / kDegree, shift, max_turn / kDegree, max_shift);
     } else if (fit.observability.unobserved == 6 || !fit.root_information.allFinite()) {
         answer.why = "no motion of the target is observed";
     } else if (!answer.rivals.empty()) {
@@ -67,7 +67,7 @@ Answer judge(Fit fit) {
         answer.why = "another pose is nearly as likely";
     } else if (fit.observability.unobserved > 0) {
         answer.kind = AnswerKind::unobservable;
-        answer.why = in_words(fit.observability);
+        answer.why = to_text(fit.observability);
     } else {
         answer.kind = AnswerKind::good;
     }

@@ -5,8 +5,8 @@
 
 namespace narpa {
 
-/// In the axes of a sensor, during a sweep or an exposure: at t_s after the time of the pose the target's attitude
-/// is exp_rotation(t_s * rate) * q, and its origin lies at t + t_s * velocity.
+/// Motion of a target in a sensor's axes, during a sweep or an exposure: at t_s after the time of the pose the
+/// target's attitude is exp_rotation(t_s * rate) * q, and its origin is at t + t_s * velocity.
 struct ApparentMotion {
     Vec3 velocity_m_s{};
     Vec3 rate_rad_s{};
@@ -18,12 +18,12 @@ struct ApparentMotion {
     return {normalized(exp_rotation(t_s * motion.rate_rad_s) * T_sensor_target.q),
             T_sensor_target.t + t_s * motion.velocity_m_s};
 }
-/// From one pose to another that comes dt_s after it.
+/// Motion from one pose to another dt_s later.
 [[nodiscard]] inline ApparentMotion motion_between(const Rigid3& T_sensor_target, const Rigid3& later,
                                                    double dt_s) {
     return {(later.t - T_sensor_target.t) / dt_s, rotation_vector(later.q * conjugate(T_sensor_target.q)) / dt_s};
 }
-/// The same motion in other axes, which stand still in the first.
+/// The same motion in other axes that are fixed relative to the first.
 [[nodiscard]] inline ApparentMotion rotated(const Quat& q, const ApparentMotion& motion) {
     return {q * motion.velocity_m_s, q * motion.rate_rad_s};
 }

@@ -28,7 +28,7 @@ public:
 #pragma GCC unroll 6
             for (int k = 0; k < j; ++k) d -= scaled[j][k] * L_[j][k];
             positive_ = positive_ && d > 0;
-            // The remaining part of a diagonal entry does not depend on the row's unit.
+            // A pivot over its diagonal entry does not depend on the row's unit.
             smallest_ = std::min(smallest_, d / M(j, j));
             inverse_d_[j] = 1 / d;
 #pragma GCC unroll 6
@@ -45,7 +45,7 @@ public:
     [[nodiscard]] bool positive_definite() const noexcept {
         return positive_;
     }
-    /// The smallest pivot as a part of its diagonal entry, in (0, 1]: near rounding where rank is missing.
+    /// The smallest pivot over its diagonal entry, in (0, 1]: near rounding if the matrix is rank-deficient.
     [[nodiscard]] double smallest_pivot() const noexcept {
         return smallest_;
     }
@@ -83,9 +83,9 @@ private:
     bool positive_ = true;
 };
 
-/// Of residuals e = measured - predicted with weights W: A = J' W J, g = J' W e, chi2 = e' W e (or the robust
-/// cost). Of A the lower triangle is read. `rounding`: the part of chi2 that the rounding of the residuals makes, a
-/// noise of its own: no step can be told from it that promises less.
+/// Normal equations of residuals e = measured - predicted with weights W: A = J' W J, g = J' W e, chi2 = e' W e (or
+/// the robust cost). Only the lower triangle of A is read. `rounding`: the part of chi2 due to rounding of the
+/// residuals; a smaller predicted reduction of chi2 is not significant.
 struct NormalEquations {
     Matrix6 A = Matrix6::Zero();
     Vector6 g = Vector6::Zero();
@@ -128,17 +128,17 @@ struct DampedStep {
 inline constexpr std::size_t kLmIterationsMax = 200;
 inline constexpr int kLmPatience = 6;
 
-/// Converged: the undamped step is shorter than step_sigma, or promises less than rounding makes; or, in a curved
-/// valley, a step was taken and chi2 fell by less than chi2_settled, far below its noise, over the last kLmPatience
-/// iterations.
+/// Converged: the undamped step is shorter than step_sigma, or its predicted reduction is below rounding; or, in a
+/// curved valley, a step was accepted and chi2 fell by less than chi2_settled, far below its noise, over the last
+/// kLmPatience iterations.
 struct LmOptions {
     double lambda = 1e-3;      ///< at the start
-    double gain_min = 1e-3;    ///< a step is taken where the gain ratio exceeds this
+    double gain_min = 1e-3;    ///< a step is accepted if the gain ratio exceeds this
     double step_sigma = 1e-4;  ///< standard deviations
     double chi2_settled = 3e-3;
-    int iterations_max = 100;  ///< steps tried, taken or not; at most kLmIterationsMax
+    int iterations_max = 100;  ///< steps tried, accepted or not; at most kLmIterationsMax
     Damping damping = Damping::diagonal;
-    double up = 11, down = 9;  ///< lambda *= up where a step is rejected, /= down where it is taken
+    double up = 11, down = 9;  ///< lambda *= up if a step is rejected, /= down if it is accepted
 };
 
 enum class LmStatus : std::uint8_t { converged, no_convergence, no_start };
@@ -154,9 +154,9 @@ struct LmSummary {
     }
 };
 
-/// Problem: `bool evaluate(const State&, NormalEquations&) const`, false where the state is impossible (a point
-/// behind the camera); `State moved(const State&, const Vector6&) const`. `state`: the start; the minimum in the
-/// end. Fills `summary` in place, for it is not small.
+/// Problem: `bool evaluate(const State&, NormalEquations&) const`, false if the state is impossible (a point behind
+/// the camera); `State moved(const State&, const Vector6&) const`. `state`: start value on entry, minimum on
+/// return. `summary` is filled in place because it is large.
 template <class Problem, class State>
 void levenberg_marquardt(const Problem& problem, State& state, const LmOptions& o, LmSummary& summary) {
     constexpr double kLambdaMin = 1e-7, kLambdaMax = 1e7;
@@ -169,8 +169,8 @@ void levenberg_marquardt(const Problem& problem, State& state, const LmOptions& 
     summary.chi2_at[0] = now.chi2;
     summary.status = LmStatus::no_convergence;
     double lambda = o.lambda;
-    // Rounding changes chi2 by itself, and by its product with the residuals. Of a pose that does not fit, whose
-    // residuals are large, that is no excuse to end early.
+    // Rounding changes chi2 by itself and by its product with the residuals. The limit on chi2 keeps the large
+    // residuals of a pose that does not fit from ending the iteration early.
     constexpr double kChi2OfAFit = 1e3;
     const auto small = [&](const DampedStep& s) {
         const double unresolved = now.rounding + 2 * std::sqrt(std::min(now.chi2, kChi2OfAFit) * now.rounding);
@@ -179,7 +179,7 @@ void levenberg_marquardt(const Problem& problem, State& state, const LmOptions& 
     while (summary.iterations < iterations_max) {
         const DampedStep step = damped_step(now, lambda, o.damping);
         if (step.solved && small(step)) {
-            // Damping shortens steps too: convergence is judged by the undamped one.
+            // Damping shortens steps too, so convergence is judged by the undamped step.
             const DampedStep full = damped_step(now, 0, o.damping);
             if (!full.solved || small(full)) {
                 if (full.solved) state = problem.moved(state, full.h);

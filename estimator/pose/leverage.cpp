@@ -13,7 +13,7 @@ struct Leverage {
     double value = 0;
 };
 
-/// The largest within the observed motions.
+/// Row with the largest leverage within the observed motions.
 Leverage largest(const CheckedInformation& in, std::span<const WeightedRow> rows) {
     Matrix6 root = Matrix6::Zero();  // of the inverse
     for (int i = in.observability.unobserved; i < 6; ++i) {

@@ -1,4 +1,4 @@
-/// estimator/pose/leverage.h - measurements that no others check.
+/// estimator/pose/leverage.h - finds measurements that are not checked by others.
 ///
 /// The leverage of a measurement is the part of the information along its own direction that it holds itself: w j'
 /// H^-1 j, with j its derivative, w its weight and H the Hessian of all. At one it has no residual, whatever its
@@ -20,15 +20,16 @@ struct WeightedRow {
     bool checked = true;
 };
 
-/// What rows that others check hold.
+/// Information of the rows that are checked by others.
 struct CheckedInformation {
     Matrix6 hessian = Matrix6::Zero(), information = Matrix6::Zero();  ///< sums with and without the weights
     Observability observability{};
     int unchecked = 0;  ///< rows left out
 };
 
-/// Leaves out the rows that are not checked, and marks so and leaves out those that hold a motion alone, or two of
-/// them together: of leverages above 0.9 once the other is left out. `threshold`: of observability().
+/// Leaves out the rows that are not checked. Also marks as not checked and leaves out rows that determine a motion
+/// alone, or in pairs: leverages above 0.9, for the second of a pair once the first is left out. `threshold`: of
+/// observability().
 [[nodiscard]] CheckedInformation checked_information(std::span<WeightedRow> rows, const PointSpread& spread,
                                                      double threshold);
 

@@ -10,7 +10,7 @@ namespace narpa {
 /// Standard deviation of a normal distribution over its median absolute deviation.
 inline constexpr double kMadToSigma = 1.4826;
 
-/// Of an even number of values the larger of the middle two; 0 for none. Reorders the values.
+/// Median; for an even number of values the larger of the middle two, for none 0. Reorders the values.
 template <class T>
 [[nodiscard]] T upper_median(std::span<T> values) {
     if (values.empty()) return 0;

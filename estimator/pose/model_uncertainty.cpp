@@ -15,9 +15,9 @@ PoseShifts pose_shifts(const ModelUncertainty& u, const Rigid3& T, const Apparen
 
 PoseShifts image_shifts(const ModelUncertainty& u, const Rigid3& T, const ApparentMotion& motion,
                         const std::optional<Vector6>& by_focal) {
-    // The image of a larger body further away is the same. A longer focal length makes it appear nearer: the range
-    // grows along the axis, the point stays beside it, and the line of sight, which attitudes are seen against,
-    // turns.
+    // A larger body further away has the same image. A longer focal length makes the body appear nearer: the
+    // estimated range grows along the axis while the lateral position stays, and the line of sight, to which
+    // estimated attitudes are relative, rotates.
     const Eigen::Vector3d t = to_eigen(T.t), along(0, 0, T.t.z);
     PoseShifts of_camera = PoseShifts::Zero(6, 2);
     of_camera.col(0).tail<3>() = u.scale * t;

@@ -1,4 +1,4 @@
-/// estimator/pose/model_uncertainty.h - what is not known exactly of the model that an estimator believes in.
+/// estimator/pose/model_uncertainty.h - uncertainty of the model that an estimator uses.
 ///
 /// A nuisance p of standard deviation s that the estimator does not solve for shifts its answer by dx/dp s. Such
 /// errors do not average out over pixels, so their covariance, the sum of (dx/dp s)(dx/dp s)', is added to that of
@@ -19,7 +19,7 @@ namespace narpa {
 /// Standard deviations. 0: exact.
 struct ModelUncertainty {
     double scale = 0;          ///< of the target's size, as a part of it
-    double mesh_m = 0;         ///< of the mesh's place in the target's axes, each axis
+    double mesh_m = 0;         ///< of the mesh's position in the target's axes, per axis
     double albedo = 0;         ///< of its brightness, as a part of it
     double light_rad = 0;      ///< of the light's direction in the target's axes: Sun, or the target's own attitude
     double focal = 0;          ///< of the focal length, as a part of it
@@ -51,18 +51,18 @@ inline constexpr std::array<ModelErrorName, 8> kModelErrors{{
 /// of each nuisance. Their covariance is the matrix times its transpose.
 using PoseShifts = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 16>;
 
-/// By mesh_m, boresight_rad and clock_s, which act on the poses of every sensor alike. `motion`: the target's in
-/// sensor axes.
+/// Shifts by mesh_m, boresight_rad and clock_s, which act on the poses of every sensor alike. `motion`: the
+/// target's, in sensor axes.
 [[nodiscard]] PoseShifts pose_shifts(const ModelUncertainty& u, const Rigid3& T_sensor_target,
                                      const ApparentMotion& motion);
-/// The same, and by scale and focal length as a camera sees them. `by_focal`: as the points weigh it
-/// (pnp_refine.h), for estimators that have points; none: as a target that is small beside its range moves.
+/// The same, plus the shifts by scale and focal length for a camera. `by_focal`: the shift of a fit to points
+/// (pnp_refine.h), if the estimator has points; none: that of a target which is small compared with its range.
 [[nodiscard]] PoseShifts image_shifts(const ModelUncertainty& u, const Rigid3& T_camera_target,
                                       const ApparentMotion& motion, const std::optional<Vector6>& by_focal = {});
-/// Side by side.
+/// The columns of both.
 [[nodiscard]] PoseShifts joined(const PoseShifts& a, const PoseShifts& b);
 
-/// Of the pose's error that these make: shifts shifts'.
+/// Covariance of the pose's error due to these shifts: shifts shifts'.
 [[nodiscard]] Matrix6 covariance_by(const PoseShifts& shifts);
 
 }  // namespace narpa

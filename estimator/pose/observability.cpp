@@ -5,7 +5,7 @@
 namespace narpa {
 namespace {
 
-/// Takes (rotation * radius, translation of the centre) to (rotation, translation of the target's origin).
+/// Transforms (rotation * radius, translation of the centre) to (rotation, translation of the target's origin).
 Matrix6 from_normalised(const PointSpread& spread) {
     Matrix6 S = Matrix6::Identity();
     S.topLeftCorner<3, 3>() /= spread.radius_m;

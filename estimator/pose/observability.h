@@ -20,28 +20,28 @@ struct PointSpread {
 
 /// Motions are errors as in pose_estimate.h: (rotation rad, translation m).
 struct Observability {
-    /// Ascending, of the Hessian for a weight of one and a radius of one: a cube has 2/15 three times, for its
-    /// rotations, and 1/3 three times.
+    /// Eigenvalues of the Hessian for a total weight of one and a radius of one, ascending: a cube has 2/15 three
+    /// times, for its rotations, and 1/3 three times.
     Vector6 eigenvalues = Vector6::Zero();
     /// Columns: the eigenvectors. Each moves points at the radius by about a metre: |rotation|^2 radius^2 +
     /// |translation of the centre|^2 = 1 m^2.
     Matrix6 motions = Matrix6::Zero();
-    int unobserved = 0;  ///< so many of them, from the first, are below the threshold
+    int unobserved = 0;  ///< number of leading motions whose eigenvalue is below the threshold
 
     /// The motion x that solves H x = gradient within the observable subspace. `hessian`: that passed to
     /// observability().
     [[nodiscard]] Vector6 solve(const Matrix6& hessian, const Vector6& gradient) const;
-    /// This information of the amounts of the motions, of the unobservable ones that of a unit matrix.
+    /// The information matrix in coordinates along the motions; unit matrix for the unobserved ones.
     [[nodiscard]] Matrix6 along_motions(const Matrix6& information) const;
     /// `factor` times the inverse of this information in the observable subspace; along unobservable motions the
     /// standard deviation is kUnobservedSigma.
     [[nodiscard]] Matrix6 covariance(const Matrix6& information, double factor) const;
-    /// The same without the unobservable motions: a root of the information (root_information.h), a row of zeros
+    /// Root of the inverse of that covariance without the unobserved motions (root_information.h): a row of zeros
     /// for each of these.
     [[nodiscard]] Matrix6 root_information(const Matrix6& information, double factor) const;
 };
 
-/// Metres of the eigenvectors' motion: so large that a filter ignores the estimate along them.
+/// Standard deviation along an unobserved motion, m: so large that a filter ignores the estimate along it.
 inline constexpr double kUnobservedSigma = 1e4;
 
 /// `hessian`: the sum of weight * J J', J the derivative of a point's distance from its plane with the motion.

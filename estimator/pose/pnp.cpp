@@ -17,7 +17,7 @@ double typical_sigma_px(const PnpInput& input) {
     return std::sqrt(sum / static_cast<double>(input.covariance_px2.size()));
 }
 
-/// Extent of the body's thinnest direction in the image, in standard deviations of a pixel, about.
+/// Approximate extent of the body's thinnest direction in the image, in standard deviations of a pixel.
 double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, const PointExtent& spread) {
     double mean_u = 0, mean_v = 0, sum = 0;
     const double n = static_cast<double>(points.size());
@@ -95,7 +95,7 @@ void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread) {
     if (few || depth < kReversibleSigma || !fits()) consider_reversed(spread);
 }
 
-// Four or five points fit several poses within the noise: the poses of triples are tried too.
+// Four or five points fit several poses within the noise: also tries the poses of triples.
 void PnpSolver::consider_triples() {
     constexpr std::size_t kTriples = 4, kRefined = 3;
     std::array<std::pair<double, CentredPose>, 2 * kTriples> tried;
@@ -145,21 +145,21 @@ void PnpSolver::consider_reversed(const PointExtent& spread) {
 }
 
 bool fits_the_noise(double chi2, double degrees_of_freedom) noexcept {
-    return chi2 < degrees_of_freedom + kMostChi2Sigmas * std::sqrt(2 * degrees_of_freedom);
+    return chi2 < degrees_of_freedom + kMaxChi2Sigmas * std::sqrt(2 * degrees_of_freedom);
 }
 
 Answer PnpSolution::answer() const {
     Fit f;
     if (!ok()) {
-        f.failed = in_words(status);
+        f.failed = to_text(status);
         return judge(std::move(f));
     }
     const double freedom = std::max(1, fit.degrees_of_freedom);
     f.residual = std::sqrt(fit.chi2 / freedom);
-    f.residual_most = std::sqrt(1 + kMostChi2Sigmas * std::sqrt(2 / freedom));
+    f.residual_max = std::sqrt(1 + kMaxChi2Sigmas * std::sqrt(2 / freedom));
     observe(fit.T_camera_body, fit.covariance, f);
     const double worse = second.chi2 - fit.chi2;
-    if (has_second && worse < kAsLikely) f.rivals.push_back({second.T_camera_body, worse});
+    if (has_second && worse < kRival_chi2) f.rivals.push_back({second.T_camera_body, worse});
     return judge(std::move(f));
 }
 

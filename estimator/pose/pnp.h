@@ -1,5 +1,5 @@
-/// estimator/pose/pnp.h - perspective-n-point: the pose from correspondences, without a guess, with outliers on
-/// request.
+/// estimator/pose/pnp.h - perspective-n-point: the pose from correspondences, without a guess, optionally with
+/// outliers.
 ///
 /// Initial poses (pnp_start.h) are refined (pnp_refine.h); the least chi2 wins. Where the fit is worse than the
 /// noise allows, or points are few, OpenCV's SQPNP and IPPE supply more initial poses. The second pose of a nearly
@@ -15,8 +15,8 @@
 namespace narpa {
 
 inline constexpr double kAmbiguousChi2 = 9;  ///< three standard deviations
-/// Residuals of so many standard deviations of their sum of squares beyond its mean are not noise.
-inline constexpr double kMostChi2Sigmas = 5;
+/// A sum of squares this many of its standard deviations above its mean is not due to noise.
+inline constexpr double kMaxChi2Sigmas = 5;
 inline constexpr double kImpreciseSigma = 0.01;         ///< of the range
 inline constexpr double kInlierSquaredResidual = 13.8;  ///< 99.9 % of chi-square with two degrees of freedom
 
@@ -26,19 +26,18 @@ struct PnpSolution {
     /// Another minimum with all points in front of the camera, if one was found.
     bool has_second = false;
     PnpFit second;
-    bool imprecise =
-        false;  ///< the position's sigma exceeds 1 % of the range: next to a danger cylinder, or too far
-    std::vector<std::uint8_t> inlier;  ///< for each point 1 where the fit used it
+    bool imprecise = false;  ///< position sigma above 1 % of the range: near a danger cylinder, or too far
+    std::vector<std::uint8_t> inlier;  ///< for each point: 1 if the fit used it
     std::size_t inliers = 0;
 
     [[nodiscard]] bool ok() const noexcept { return status == PnpStatus::converged; }
-    /// The second pose may be the true one: its chi2 is less than 9 above the first's.
+    /// True if the second pose may be the true one: its chi2 is less than 9 above the first's.
     [[nodiscard]] bool ambiguous() const noexcept { return has_second && second.chi2 - fit.chi2 < kAmbiguousChi2; }
-    /// By chi2 at the given noise, the second pose and what the points hold (answer.h).
+    /// Classifies the pose by chi2 at the given noise, the second pose and the observability (answer.h).
     [[nodiscard]] Answer answer() const;
 };
 
-/// Whether chi2 of so many degrees of freedom is as noise makes it.
+/// True if chi2 with this many degrees of freedom is consistent with noise.
 [[nodiscard]] bool fits_the_noise(double chi2, double degrees_of_freedom) noexcept;
 
 class PnpSolver {

@@ -7,7 +7,7 @@
 
 namespace narpa {
 
-const char* in_words(PnpStatus status) {
+const char* to_text(PnpStatus status) {
     switch (status) {
         case PnpStatus::converged: return "converged";
         case PnpStatus::no_convergence: return "the refinement did not settle within its iterations";
@@ -47,7 +47,7 @@ PnpStatus check(const PnpInput& input) {
 
 namespace {
 
-/// A pinhole's formulas are inlined; of any other model they are virtual calls.
+/// Formulas of a pinhole are inlined; other models use virtual calls.
 template <class F>
 void with_model(const CameraModel& model, const F& f) {
     if (const Pinhole* pinhole = model.pinhole())
@@ -83,7 +83,7 @@ void PnpPoints::assign(const PnpInput& input, std::span<const std::uint8_t> chos
     assign_if(input, [&](std::size_t i) { return chosen[i] != 0; });
 }
 
-/// Residuals are taken on the plane z = 1 and weighed as those of the image, to first order about the measured
+/// Residuals are formed on the plane z = 1 and weighted like those of the image, to first order about the measured
 /// pixel: exact for a pinhole.
 template <class Model>
 void PnpPoints::put(std::size_t i, const PnpInput& input, const Model& model, std::size_t point) {
@@ -109,7 +109,7 @@ void PnpPoints::put(std::size_t i, const PnpInput& input, const Model& model, st
         const double r = std::hypot(a00, a10), c = a00 / r, s = a10 / r;
         to.l00[k] = r, to.l10[k] = c * a01 + s * a11, to.l11[k] = c * a11 - s * a01;
     }
-    // A residual is off by some last digits of the numbers that it is the difference of.
+    // Rounding error of a residual: the last digits of the numbers whose difference it is.
     constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
     const double size2 = 1 + on_plane.x * on_plane.x + on_plane.y * on_plane.y;
     rounding_ +=
@@ -120,7 +120,7 @@ void PnpPoints::pad() {
     for (std::size_t i = size_; i % kGroup != 0; ++i) {
         Group& g = groups_[i / kGroup];
         const std::size_t k = i % kGroup;
-        // The first point once more, without weight: it is in front of the camera where the points are.
+        // Pads with the first point at zero weight: it is in front of the camera whenever the points are.
         g.x[k] = g.x[0], g.y[k] = g.y[0], g.z[k] = g.z[0], g.u[k] = g.u[0], g.v[k] = g.v[0];
         g.l00[k] = g.l10[k] = g.l11[k] = 0;
     }
@@ -205,7 +205,7 @@ NARPA_EACH_ISA void accumulate(std::span<const PnpPoints::Group> groups, const d
         if (!(nearest[k] > sums.depth_min)) sums.depth_min = nearest[k];
 }
 
-/// s of every lane: infinite behind the camera, 0 where there is no point.
+/// s of every lane: infinite behind the camera, 0 for padding.
 NARPA_EACH_ISA void square_residuals(std::span<const PnpPoints::Group> groups, const double* R, const double* t,
                                      double* out) {
     const auto load = [](const PnpPoints::Group::Lanes& lanes) -> const V& {

@@ -13,13 +13,13 @@
 
 namespace narpa {
 
-/// Cauchy's grows logarithmically beyond `scale`, in standard deviations.
+/// Cauchy's loss grows logarithmically beyond `scale`, in standard deviations.
 struct RobustLoss {
     enum class Kind : std::uint8_t { none, cauchy };
     Kind kind = Kind::none;
     double scale = 2.5;
 
-    /// Of a residual's squared normalised length s = r' C^-1 r; rho(s) = s - ... near 0.
+    /// rho(s) of a residual's squared normalised length s = r' C^-1 r; rho(s) = s - ... near 0.
     [[nodiscard]] double cost(double s) const {
         return kind == Kind::none ? s : scale * scale * std::log1p(s / (scale * scale));
     }
@@ -55,17 +55,17 @@ enum class PnpStatus : std::uint8_t {
     converged,
     no_convergence,   ///< not within the iterations
     degenerate,       ///< the points leave some direction of the pose undetermined
-    behind_camera,    ///< the pose to start from has a point behind the camera, or none was found that has not
+    behind_camera,    ///< the start pose has a point behind the camera, or no pose without one was found
     too_few_points,   ///< less than 3
     too_many_points,  ///< more than the solver was made for
-    sizes_differ,     ///< points, pixels and covariances are not of one number
+    sizes_differ,     ///< points, pixels and covariances differ in number
     not_finite,       ///< NaN or infinity in a point, a pixel or the pose to start from
     bad_camera,       ///< a focal length is not above 0, or a number is not finite
     bad_noise,        ///< sigma_px is not above 0, or a covariance not positive definite
     no_consensus,     ///< no pose agrees with enough of the points
 };
 /// What was wrong and what was expected, as a sentence.
-[[nodiscard]] const char* in_words(PnpStatus status);
+[[nodiscard]] const char* to_text(PnpStatus status);
 
 /// `converged` where the input is usable, else what is wrong with it.
 [[nodiscard]] PnpStatus check(const PnpInput& input);
@@ -93,7 +93,7 @@ public:
     [[nodiscard]] std::size_t capacity() const noexcept { return groups_.size() * kGroup; }
     [[nodiscard]] const Vec3& centroid_body_m() const noexcept { return centroid_; }
 
-    /// Of point i: from the centroid, body axes; and where its pixel's ray meets the plane z = 1.
+    /// Point i relative to the centroid, body axes; and where its pixel's ray meets the plane z = 1.
     [[nodiscard]] Vec3 centred_body_m(std::size_t i) const {
         const Group& g = groups_[i / kGroup];
         return {g.x[i % kGroup], g.y[i % kGroup], g.z[i % kGroup]};
@@ -105,7 +105,7 @@ public:
 
     [[nodiscard]] CentredPose centred(const Rigid3& T_camera_body) const;
     [[nodiscard]] Rigid3 uncentred(const CentredPose& pose) const;
-    /// From errors of a centred pose, (rotation, centroid), to those of pose_estimate.h.
+    /// Converts the covariance of a centred pose's error, (rotation, centroid), to that of pose_estimate.h.
     [[nodiscard]] Matrix6 uncentred(const CentredPose& pose, const Matrix6& covariance) const;
 
     /// Normal equations by (rotation rad, centroid m), both in camera axes and on the left. False where a point is
@@ -121,9 +121,9 @@ public:
     static constexpr std::size_t kGroup = 8;
     struct alignas(64) Group {
         using Lanes = std::array<double, kGroup>;
-        Lanes x, y, z;        // of the body, from the centroid
+        Lanes x, y, z;        // body point, relative to the centroid
         Lanes u, v;           // where the pixel's ray meets the plane z = 1
-        Lanes l00, l10, l11;  // whitened residual = (l00 ru + l10 rv, l11 rv); 0 where there is no point
+        Lanes l00, l10, l11;  // whitened residual = (l00 ru + l10 rv, l11 rv); 0 for padding
     };
 
 private:
@@ -147,7 +147,8 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
     return m;
 }
 
-/// Of the image point of `body_m`, which has one, by the pose's error (pose_estimate.h): px per (rad, m).
+/// Jacobian of the image point of `body_m`, which must have one, by the pose's error (pose_estimate.h): px per
+/// (rad, m).
 [[nodiscard]] inline Matrix26 reprojection_jacobian(const CameraModel& model, const Rigid3& T_camera_body,
                                                     const Vec3& body_m) {
     const Vec3 a = T_camera_body.q * body_m;

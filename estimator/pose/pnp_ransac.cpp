@@ -22,7 +22,7 @@ std::array<std::size_t, 3> draw_three(std::minstd_rand& random, std::size_t n) {
     return drawn;
 }
 
-/// Samples after which one of three inliers was among them, all but surely, where so many of n are inliers.
+/// Samples of three needed so that, with probability 1 - kMissedConsensus, one has only inliers, for so many of n.
 double samples_needed(std::size_t inliers, std::size_t n) {
     const auto m = static_cast<double>(inliers), all = static_cast<double>(n);
     const double clean = m * (m - 1) * (m - 2) / (all * (all - 1) * (all - 2));
@@ -39,7 +39,7 @@ void PnpSolver::solve_with_outliers(const PnpInput& input) {
         solution_.status = PnpStatus::no_consensus;
         return;
     }
-    // The inliers of a pose from inliers: settles within a few rounds.
+    // Alternates between fitting the inliers and selecting them: settles within a few rounds.
     constexpr int kRounds = 5;
     Rigid3 T = consensus_.T;
     for (int round = 0; round < kRounds; ++round) {
@@ -94,7 +94,7 @@ void PnpSolver::try_hypothesis(const CentredPose& pose) {
     const double cost_of_sample = all_.truncated_cost(pose, kSampleSquaredResidual);
     if (!(cost_of_sample < consensus_.cost_of_sample)) return;
     consensus_.cost_of_sample = cost_of_sample;
-    // Local optimisation (Chum, Matas and Kittler 2003): the best samples are refined by all that agrees.
+    // Local optimisation (Chum, Matas and Kittler 2003): refines the best samples with all points that agree.
     refine(all_, all_.uncentred(pose), {{}, kPolish}, trial_);
     if (trial_.status != PnpStatus::converged) return;
     const double cost = all_.truncated_cost(all_.centred(trial_.T_camera_body), kInlierSquaredResidual);

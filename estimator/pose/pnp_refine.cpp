@@ -67,16 +67,16 @@ namespace {
 
 struct PoseInformation {
     Matrix6 information = Matrix6::Zero();
-    Vector6 by_focal = Vector6::Zero();  ///< J' C^-1 of what the pixels move by with the focal length
+    Vector6 by_focal = Vector6::Zero();  ///< J' C^-1 times the pixels' derivative by the focal length
 };
 
 Result<PoseInformation> pose_information(const PnpInput& input, const Rigid3& T_camera_body) {
-    if (const PnpStatus status = check(input); status != PnpStatus::converged) return Error{in_words(status)};
+    if (const PnpStatus status = check(input); status != PnpStatus::converged) return Error{to_text(status)};
     const auto axis = input.camera->project({0, 0, 1});
     PoseInformation sum;
     for (std::size_t i = 0; i < input.body_m.size(); ++i) {
         const auto pixel = input.camera->project(T_camera_body * input.body_m[i]);
-        if (!pixel) return Error{in_words(PnpStatus::behind_camera)};
+        if (!pixel) return Error{to_text(PnpStatus::behind_camera)};
         Eigen::Matrix2d C = Eigen::Matrix2d::Identity() * (input.sigma_px * input.sigma_px);
         if (!input.covariance_px2.empty()) {
             const PixelCovariance& s = input.covariance_px2[i];
@@ -96,7 +96,7 @@ Result<Matrix6> pnp_bound(const PnpInput& input, const Rigid3& T_camera_body) {
     const auto sum = pose_information(input, T_camera_body);
     if (!sum) return sum.error();
     Matrix6 bound;
-    if (!invert_information(sum->information, bound)) return Error{in_words(PnpStatus::degenerate)};
+    if (!invert_information(sum->information, bound)) return Error{to_text(PnpStatus::degenerate)};
     return bound;
 }
 

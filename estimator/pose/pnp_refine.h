@@ -19,11 +19,11 @@ struct RefineOptions {
 struct PnpFit {
     PnpStatus status = PnpStatus::no_convergence;
     Rigid3 T_camera_body{};
-    /// Of T_camera_body (pose_estimate.h), (rad, m): the inverse of the information at the given pixel noise, with
-    /// the robust weights where a loss is on.
+    /// Covariance of T_camera_body (pose_estimate.h), (rad, m): the inverse of the information at the given pixel
+    /// noise, with the robust weights if a loss is used.
     Matrix6 covariance = Matrix6::Zero();
-    double chi2 = 0;             ///< of the residuals in units of their noise, or the robust cost
-    int degrees_of_freedom = 0;  ///< 2 N - 6: what chi2 is about, where the noise is as given and no loss is on
+    double chi2 = 0;             ///< sum of squared residuals in units of their noise, or the robust cost
+    int degrees_of_freedom = 0;  ///< 2 N - 6: expected chi2 if the noise is as given and no loss is used
     LmSummary summary;
 
     [[nodiscard]] bool ok() const noexcept { return status == PnpStatus::converged; }
@@ -33,14 +33,14 @@ struct PnpFit {
     }
 };
 
-/// Whether a start can be refined: finite, with a rotation.
+/// True if a start can be refined: finite, with a rotation.
 bool is_usable(const Rigid3& T);
 
 /// Refines from `start`; `fit` is filled in place. `points` holds what was assigned to it. Every point stays in
 /// front of the camera.
 void refine(const PnpPoints& points, const Rigid3& start, const RefineOptions& options, PnpFit& fit);
 
-/// With room for points_max points, for loops that may not allocate.
+/// Has room for points_max points, for loops that may not allocate.
 class PnpRefiner {
 public:
     explicit PnpRefiner(std::size_t points_max) : points_(points_max) {}
@@ -58,8 +58,8 @@ private:
 /// check() finds, a point behind the camera, or a direction that the points leave undetermined.
 [[nodiscard]] Result<Matrix6> pnp_bound(const PnpInput& input, const Rigid3& T_camera_body);
 
-/// How far a least-squares pose moves, as an error (pose_estimate.h), with the focal length, by as much as that
-/// grows as a part of itself. Points at different depths turn it. Zero where pnp_bound fails.
+/// Shift of a least-squares pose, as an error (pose_estimate.h), per relative change of the focal length. Points at
+/// different depths also make it rotate. Zero where pnp_bound fails.
 [[nodiscard]] Vector6 shift_by_focal(const PnpInput& input, const Rigid3& T_camera_body);
 
 }  // namespace narpa

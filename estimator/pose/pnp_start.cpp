@@ -10,11 +10,11 @@ namespace {
 
 constexpr int kPerspectiveSteps = 6;
 constexpr double kSettled = 1e-3;  // of the depth: the refinement does the rest
-constexpr double kAstray = 0.1;    // of the depth in the last step: perspective is too strong for this
-constexpr double kLine = 1e-5;     // narrower than this part of their length, points lie on a line
+constexpr double kAstray = 0.1;    // of the depth in the last step: diverges, as perspective is too strong
+constexpr double kLine = 1e-5;     // points narrower than this part of their length lie on a line
 
-/// Scaled orthography of flat points: A / s is the upper left block of a rotation, of singular values 1 and |cos of
-/// the tilt|. `sign` chooses which side is nearer.
+/// Scaled orthography of flat points: A / s is the upper left block of a rotation, whose singular values are 1 and
+/// |cos of the tilt|. `sign` chooses which side is nearer.
 struct ScaledRows {
     Vec3 r1, r2;
     double scale = 0;
@@ -40,7 +40,7 @@ ScaledRows solid_rows(const Vec3& a1, const Vec3& a2) {
     return {r1, r2, scale};
 }
 
-/// p: a point along the axes of spread.
+/// p: a point's coordinates along the axes of PointExtent.
 struct AlongAxes {
     Vec3 p;
     Pixel seen;
@@ -150,7 +150,7 @@ void append_poses(std::span<const BodyPoint> points, const Solve& solve, std::ve
     }
 }
 
-/// Of the plane z = 1.
+/// Intrinsics of the plane z = 1.
 const cv::Matx33d kUnitCamera = cv::Matx33d::eye();
 
 }  // namespace

@@ -35,11 +35,11 @@ struct InitialPoses {
 [[nodiscard]] InitialPoses orthographic_poses(std::span<const BodyPoint> points, const PointExtent& spread,
                                               bool flat);
 
-/// Of three points, whose mean need not be 0; the poses are about the origin.
+/// Poses of three points, whose mean need not be 0; the poses are about the origin.
 [[nodiscard]] InitialPoses three_point_poses(std::array<BodyPoint, 3> points);
 
-/// The same image in scaled orthography: mirrored in the plane across the line of sight and in the body's plane of
-/// widest spread.
+/// The pose with the same image in scaled orthography: mirrored at the plane perpendicular to the line of sight and
+/// at the body's plane of widest spread.
 [[nodiscard]] CentredPose depth_reversed(const CentredPose& pose, const PointExtent& spread);
 
 /// By OpenCV: SQPNP (Terzakis and Lourakis 2020), and IPPE (Collins and Bartoli 2014) where `flat`, both

@@ -1,8 +1,8 @@
-/// estimator/pose/pose_estimate.h - a relative pose with what is known of its error.
+/// estimator/pose/pose_estimate.h - a relative pose and the definition of its error.
 ///
 /// The state is `T_camera_body`: it takes the target's body coordinates to the camera's (x right, y down, z
-/// forward). An error is a vector of six, (rotation rad, translation m), both in camera axes and on the left:
-/// truth = {exp_rotation(rotation) * q, t + translation}. Covariances and bounds are of this vector, everywhere.
+/// forward). An error is a vector of six, (rotation rad, translation m), in camera axes and applied from the left:
+/// truth = {exp_rotation(rotation) * q, t + translation}. All covariances and bounds are of this vector.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,15 +42,15 @@ inline Vec3 to_vec3(const Eigen::Vector3d& v) {
 [[nodiscard]] Vector6 error_between(const Rigid3& from, const Rigid3& to);
 
 inline constexpr double kDegree = 3.14159265358979323846 / 180;  ///< radians
-/// An error of this size in rotation and in translation, each in a direction drawn at random.
+/// Random error of this size in rotation and in translation, each in a random direction.
 [[nodiscard]] Vector6 random_error(double rotation_rad, double translation_m, std::mt19937_64& random);
 
-/// Roots of the summed variances: of the length of an error's rotation, rad, and of its translation, m.
+/// Square roots of the summed variances of an error's rotation, rad, and translation, m.
 [[nodiscard]] double rotation_sigma(const Matrix6& covariance);
 [[nodiscard]] double position_sigma(const Matrix6& covariance);
 
-/// Normalised estimation error squared, e' C^-1 e: chi-square with six degrees of freedom where the covariance is
-/// right. Infinite where it is not positive definite.
+/// Normalised estimation error squared, e' C^-1 e: chi-square with six degrees of freedom if the covariance is
+/// right. Infinite if it is not positive definite.
 [[nodiscard]] double normalised_error_squared(const Vector6& error, const Matrix6& covariance);
 
 /// The covariance of T^-1, given that of T.

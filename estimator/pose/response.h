@@ -1,10 +1,10 @@
-/// estimator/pose/response.h - covariances of poses whose measurements respond to motions otherwise than the
-/// Jacobian says.
+/// estimator/pose/response.h - covariances of poses whose measurements respond to motions differently from the
+/// Jacobian.
 ///
-/// A pose where J' W r = 0 answers a motion by the response R = (J' W J)^-1 J' W D, D being what the motion really
-/// changes the measurements by: the identity where J = D. The pose's errors are those that the Jacobian states, C,
-/// times R^-1 (an M-estimator's covariance: P. J. Huber, "The behavior of maximum likelihood estimates under
-/// nonstandard conditions", 5th Berkeley Symposium, 1967).
+/// A pose with J' W r = 0 responds to a motion by R = (J' W J)^-1 J' W D, where D is the true change of the
+/// measurements by the motion; R is the identity if D = J. The pose's errors are R^-1 times those predicted by the
+/// Jacobian, whose covariance is C (an M-estimator's covariance: P. J. Huber, "The behavior of maximum likelihood
+/// estimates under nonstandard conditions", 5th Berkeley Symposium, 1967).
 #pragma once
 
 #include "estimator/pose/observability.h"
@@ -13,15 +13,15 @@
 
 namespace narpa {
 
-/// Of a motion of which nothing is shown: so little that its variance is beyond all limits.
-inline constexpr double kLeastShown = 1e-4;
+/// Lower limit of the response to a motion: so small that its variance exceeds all limits.
+inline constexpr double kMinShown = 1e-4;
 
-/// So many motions are measured, those that are held least: there the changes of the measurements cancel, so that
-/// errors of the Jacobian matter. The others count as shown as they are.
+/// Number of motions whose response is measured: the least observed ones, along which the changes of the
+/// measurements cancel, so that errors of the Jacobian matter. The response to the others is taken as one.
 inline constexpr int kMeasuredMotions = 3;
 
-/// R. `o`: of the covariance C (observability_of). `shown(i, motion)`: the change of the pose that the measurements
-/// show when the pose changes by `motion`, one standard deviation of the i-th of them.
+/// Returns R. `o`: observability_of the covariance C. `shown(i, motion)`: the change of the pose that the
+/// measurements show when the pose changes by `motion`, one standard deviation along the i-th motion.
 template <class Shown>
 [[nodiscard]] Matrix6 response_to_weakest(const Observability& o, Shown&& shown) {
     const Matrix6 motions = o.motions * o.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal();
@@ -34,10 +34,10 @@ template <class Shown>
     return response;
 }
 
-/// R^-1 C R^-T. Motions of which more than `most_shown` times is shown count as shown so often: with 1 nothing of C
-/// is taken away, nor where a motion is shown by less than half, as the Jacobian then is wrong in others too. All
-/// motions count as shown by at least kLeastShown. `response`: of errors (pose_estimate.h).
+/// R^-1 C R^-T. Responses are limited to kMinShown .. max_shown: with 1, C is never reduced. Nor is it reduced
+/// if some response is below one half, as the Jacobian then is wrong for other motions too. `response`: R, for
+/// errors of pose_estimate.h.
 [[nodiscard]] Matrix6 covariance_by_response(const Matrix6& covariance, const Matrix6& response,
-                                             double most_shown = 1);
+                                             double max_shown = 1);
 
 }  // namespace narpa

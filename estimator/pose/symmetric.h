@@ -1,13 +1,13 @@
 /// estimator/pose/symmetric.h - decompositions of 6 x 6 matrices, mostly symmetric ones.
 ///
-/// Eigen's, compiled once: each takes the compiler seconds, in every source that has its own.
+/// Wrappers of Eigen's decompositions, compiled once: each instantiation takes the compiler seconds.
 #pragma once
 
 #include "estimator/pose/pose_estimate.h"
 
 namespace narpa {
 
-/// Of a symmetric matrix, whose lower triangle is read.
+/// Eigenvalues of a symmetric matrix, of which the lower triangle is read.
 struct SymmetricEigen {
     Vector6 values;   ///< ascending
     Matrix6 vectors;  ///< columns, of length 1
@@ -16,11 +16,11 @@ struct SymmetricEigen {
 
 /// A = L L', A symmetric: its lower triangle is read.
 struct Cholesky {
-    Matrix6 L;                       ///< zero above the diagonal; meaningless where A is not
+    Matrix6 L;                       ///< zero above the diagonal; meaningless unless positive_definite
     bool positive_definite = false;  ///< A, within rounding
 };
 [[nodiscard]] Cholesky cholesky(const Matrix6& A);
-/// L^-1 b, of a lower triangle.
+/// L^-1 b with a lower triangular L.
 [[nodiscard]] Vector6 lower_solve(const Matrix6& L, const Vector6& b);
 [[nodiscard]] Matrix6 lower_solve(const Matrix6& L, const Matrix6& B);
 

@@ -6,7 +6,7 @@
 namespace narpa {
 
 std::vector<Quat> attitude_grid(int count) {
-    // The paper's pair: psi is the positive root of psi^4 = psi + 4.
+    // Constants of the paper: psi is the positive root of psi^4 = psi + 4.
     constexpr double kPhi = std::numbers::sqrt2, kPsi = 1.533751168755204288118041;
     std::vector<Quat> grid;
     for (int i = 0; i < count; ++i) {

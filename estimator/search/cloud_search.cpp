@@ -12,14 +12,14 @@
 namespace narpa {
 namespace {
 
-/// Circles of the approach and of the fit to all points, in parts of the target's radius.
+/// Search radii of the approach and of the fit to all points, over the target's radius.
 constexpr double kApproachCircle = 0.6, kFitCircle = 0.1;
-/// Poses from which the fits start are further apart than this, in attitude.
+/// Minimum difference in attitude between the poses from which fits start.
 constexpr double kStartsApart_deg = 6;
 
 using Approach = CloudIcp::Approach;
 
-/// The best that lie apart, the least cost first.
+/// The best approaches that differ in attitude, in order of cost.
 std::vector<Approach> best_apart(std::vector<Approach> all, std::size_t most, double radius_m) {
     std::ranges::stable_sort(all, {}, &Approach::cost);
     std::vector<Approach> apart;
@@ -35,7 +35,7 @@ std::vector<Approach> best_apart(std::vector<Approach> all, std::size_t most, do
     return apart;
 }
 
-/// It may be the pose, as far as the sweep tells.
+/// True if nothing in the sweep refutes the pose.
 bool is_possible(const CloudEstimate& e) {
     return e.settled && e.on_model && !e.empty_beams.refutes();
 }
@@ -69,7 +69,7 @@ Result<CloudEstimate> CloudSearch::find(std::span<const RangePoint> points, cons
     std::ranges::stable_sort(fits, [](const CloudEstimate& a, const CloudEstimate& b) {
         return is_possible(a) != is_possible(b) ? is_possible(a) : a.cost < b.cost;
     });
-    // From itself: how far it is from the attitude that led there says nothing.
+    // Restart from the fit itself: its distance from the grid attitude must not count against it.
     auto again = icp_.align(points, motion, fits.front().T_lidar_target, kFitCircle * radius_m, empty);
     if (!again) return again.error();
     CloudEstimate best = *std::move(again);
@@ -80,8 +80,8 @@ Result<CloudEstimate> CloudSearch::find(std::span<const RangePoint> points, cons
     for (const CloudEstimate& other : std::span(fits).subspan(1)) {
         const double worse_chi2 = 2 * (other.cost - best.cost);
         const Vector6 apart = error_between(best.T_lidar_target, other.T_lidar_target);
-        if (is_possible(other) && worse_chi2 < kAsLikely &&
-            (best.root_information * apart).squaredNorm() > kElsewhere)
+        if (is_possible(other) && worse_chi2 < kRival_chi2 &&
+            (best.root_information * apart).squaredNorm() > kDistinctPose_chi2)
             judged.rivals.push_back({other.T_lidar_target, worse_chi2});
     }
     best.rivals = judged.rivals;

@@ -1,9 +1,9 @@
-/// estimator/search/cloud_search.h - the pose of a target in a LiDAR's sweep without a guess: any attitude, where
-/// the points are.
+/// estimator/search/cloud_search.h - the pose of a target in a LiDAR's sweep without a guess: any attitude, near
+/// the points.
 ///
-/// From attitudes all over SO(3), few points lead to poses (cloud/cloud_icp.h); the best that lie apart are fitted
-/// to all points. The answer is the most likely of those that neither points nor beams without return refute;
-/// others that are as likely make it ambiguous.
+/// From attitudes all over SO(3), fits to few points yield poses (cloud/cloud_icp.h); the best distinct ones are
+/// fitted to all points. The answer is the most likely pose that is refuted neither by points nor by beams without
+/// return; other poses that are as likely make it ambiguous.
 #pragma once
 
 #include <span>
@@ -13,8 +13,8 @@
 namespace narpa {
 
 struct CloudSearchOptions {
-    int attitudes = 500;  ///< tried with few points: 31 degrees apart
-    int finished = 12;    ///< of them, fitted to all points
+    int attitudes = 500;  ///< grid attitudes tried with few points: 31 degrees apart
+    int finished = 12;    ///< of these, the number fitted to all points
 };
 
 class CloudSearch {
@@ -23,8 +23,8 @@ public:
     CloudSearch(const Tracer& tracer, std::size_t target, const IcpSettings& settings = {})
         : tracer_(tracer), target_(target), icp_(tracer, target, settings) {}
 
-    /// As CloudIcp::align. Errors: a sweep or options that are unusable, or fewer than six points on the target
-    /// wherever it is taken to be.
+    /// Like CloudIcp::align, without a guess. Errors: an unusable sweep or options, or fewer than six points on the
+    /// target at every pose tried.
     [[nodiscard]] Result<CloudEstimate> find(std::span<const RangePoint> points, const ApparentMotion& motion,
                                              std::span<const EmptyBeam> empty = {},
                                              const CloudSearchOptions& options = {});

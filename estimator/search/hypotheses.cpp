@@ -13,19 +13,20 @@
 namespace narpa {
 namespace {
 
-/// Extent of the target, px, in the renders of all attitudes, and in those of the steps; samples a pixel of these.
+/// Extent of the target in the renders of the attitude grid and of the refinement steps, px, and their samples per
+/// pixel.
 constexpr double kGridExtent_px = 20, kStepExtent_px = 36;
 constexpr int kGridSpp = 1, kStepSpp = 4;
-/// Renders whose place is improved by a second render, per one that is kept.
+/// Renders whose position is refined by a second render, per one that is kept.
 constexpr int kSecondLook = 4;
-/// Steps of attitude in degrees, of which each is taken while it helps, but no more often than this.
+/// Steps of attitude: each size is repeated while it improves the fit, at most kMaxSteps times.
 constexpr std::array<double, 3> kSteps_deg{8, 4, 2};
-constexpr int kMostSteps = 4;
-/// Hypotheses closer than this are one.
+constexpr int kMaxSteps = 4;
+/// Hypotheses closer than this count as the same.
 constexpr double kApart_deg = 8;
-/// Those that are worse than the best by more are not kept to the end.
+/// Hypotheses with a larger misfit than kWorse * best + kWorseLeast are dropped at the end.
 constexpr double kWorse = 4, kWorseLeast = 0.03;
-/// Renders by one worker.
+/// Renders per parallel task.
 constexpr std::size_t kBatch = 64;
 
 bool fits_better(const Hypothesis& a, const Hypothesis& b) {
@@ -51,7 +52,7 @@ int improve(TemplateMatcher::Worker& worker, Hypothesis& h) {
     h = worker.compare(h.T_camera_target);
     int renders = 2;
     for (const double step_deg : kSteps_deg)
-        for (int k = 0; k < kMostSteps; ++k) {
+        for (int k = 0; k < kMaxSteps; ++k) {
             Hypothesis best = h;
             for (int side = 0; side < 6; ++side) {
                 Vector6 step = Vector6::Zero();

@@ -1,4 +1,4 @@
-/// estimator/search/hypotheses.h - from all attitudes to the few that resemble the frame.
+/// estimator/search/hypotheses.h - reduces a grid of all attitudes to the few that resemble the frame.
 #pragma once
 
 #include <vector>
@@ -7,8 +7,8 @@
 
 namespace narpa {
 
-/// `attitudes` of a grid and what is left of them: the `kept` best improved by steps of attitude, and of these the
-/// `most` best that lie apart, best first. Counts the renders.
+/// Renders a grid of `attitudes`, improves the `kept` best by steps of attitude, and returns the `most` best
+/// distinct ones, best first. Adds the number of renders to `renders`.
 [[nodiscard]] std::vector<Hypothesis> find_hypotheses(const SearchView& known, const MeasuredImage& frame,
                                                       const BrightRegion& region, int attitudes, int kept, int most,
                                                       int& renders);

@@ -14,18 +14,18 @@ namespace {
 
 /// The target's least extent, px, in the coarse image that hypotheses are fitted to.
 constexpr double kCoarseExtent_px = 20;
-/// And its extent that the finest image does not exceed: to know where the target is takes no more.
+/// Largest extent of the target, px, in the finest image: acquisition needs no finer one.
 constexpr double kFineExtent_px = 128;
 constexpr int kCoarsest = 32;
-/// Samples of the fits to the coarse image, for each of its pixels, and lines each way for its derivatives.
+/// Fits to the coarse image: samples per pixel, and lines each way per pixel of the derivative.
 constexpr int kCoarseFitSamples = 8, kCoarseFitFineness = 3;
-/// Hypotheses whose loss on the coarse image exceeds the least by more are excluded by it: the frame has more
-/// information, and most of them are at their minimum.
+/// Hypotheses whose loss on the coarse image exceeds the least by more are dropped: the frame holds still more
+/// information, and most of them have reached their minimum.
 constexpr double kExcluded = 100;
-constexpr std::size_t kMostContenders = 4;
-/// The range may be beyond what was known of it by so many standard deviations.
+constexpr std::size_t kMaxContenders = 4;
+/// Tolerance about the known range interval, in standard deviations.
 constexpr double kRangeSigmas = 3;
-/// Fits with other samples, where the frame's sampling noise is not known.
+/// Number of fits with other sample seeds, where the frame's sampling noise is not known.
 constexpr int kOtherSamples = 3;
 /// Samples per pixel where whole images are compared.
 constexpr int kWholeSamples = 16;
@@ -42,7 +42,7 @@ Status check_search(const SearchOptions& o, const Rigid3& T_world_camera) {
     return Ok{};
 }
 
-/// Photometric loss over the whole image, whose least is the most likely pose.
+/// Photometric loss over the whole image; its minimum is the most likely pose.
 class WholeImage {
 public:
     WholeImage(const SearchView& known, const SensorModel& sensor, int factor, const MeasuredImage& frame,
@@ -67,8 +67,9 @@ private:
     FrameSettings settings_{};
 };
 
-/// Variance of an answer over its covariance_of_image where the frame's sampling noise is not known: it is taken to
-/// be as large as that of the renders, and the scatter of fits with other samples has twice the variance of one.
+/// Factor of an answer's covariance_of_image where the frame's sampling noise is not known: that noise is taken to
+/// be as large as the renders', and the squared difference of two fits with different samples has twice the
+/// variance of one.
 double with_sampling_noise(DenseAlignment& dense, const MeasuredImage& frame, const BodyPoses& at,
                            const DenseEstimate& answer, DenseOptions options, int& renders) {
     options.coarsest = options.finest, options.rivals = 0;
@@ -86,7 +87,7 @@ double with_sampling_noise(DenseAlignment& dense, const MeasuredImage& frame, co
 
 }  // namespace
 
-struct PoseSearch::Sought {
+struct PoseSearch::SearchState {
     SearchView known;
     const MeasuredImage& frame;
     std::span<const float> variance;
@@ -95,7 +96,7 @@ struct PoseSearch::Sought {
     std::vector<Hypothesis> hypotheses;
 };
 
-/// A hypothesis and where its fit leads.
+/// A hypothesis and the poses its fits converge to.
 struct PoseSearch::Contender {
     Rigid3 start{}, coarse{};
     DenseEstimate fit;
@@ -125,13 +126,13 @@ Result<SearchEstimate> PoseSearch::find(const MeasuredImage& frame, const BodyPo
                                         const Rigid3& T_world_camera, const SearchOptions& options,
                                         std::span<const float> frame_variance) {
     if (auto good = check_search(options, T_world_camera); !good) return good.error();
-    Sought sought{{render_scene_, camera_, target_, at, T_world_camera, options.range_m,
-                   (1 - options.range_part) * options.range_m, (1 + options.range_part) * options.range_m},
-                  frame,
-                  frame_variance,
-                  options.dense,
-                  1,
-                  {}};
+    SearchState sought{{render_scene_, camera_, target_, at, T_world_camera, options.range_m,
+                        (1 - options.range_part) * options.range_m, (1 + options.range_part) * options.range_m},
+                       frame,
+                       frame_variance,
+                       options.dense,
+                       1,
+                       {}};
     if (auto good = dense_.check(frame, frame_variance, at, {}); !good) return good.error();
     sought.dense.T_world_camera = T_world_camera;
     SearchEstimate out;
@@ -158,8 +159,8 @@ Result<SearchEstimate> PoseSearch::find(const MeasuredImage& frame, const BodyPo
     return out;
 }
 
-/// Hypotheses fitted to a coarse image, the least loss first, without those that it excludes.
-std::vector<PoseSearch::Contender> PoseSearch::coarse_fits(const Sought& sought, SearchEstimate& out) {
+/// Fits the hypotheses to a coarse image and returns those that it does not exclude, in order of loss.
+std::vector<PoseSearch::Contender> PoseSearch::coarse_fits(const SearchState& sought, SearchEstimate& out) {
     DenseOptions options = sought.dense;
     options.coarsest = options.finest = sought.factor;
     options.samples_per_pixel = kCoarseFitSamples;
@@ -177,7 +178,7 @@ std::vector<PoseSearch::Contender> PoseSearch::coarse_fits(const Sought& sought,
     std::ranges::stable_sort(all, {}, &Contender::loss);
     std::vector<Contender> apart;
     for (const Contender& c : all) {
-        if (c.loss > all.front().loss + kExcluded || apart.size() == kMostContenders) break;
+        if (c.loss > all.front().loss + kExcluded || apart.size() == kMaxContenders) break;
         const bool elsewhere = std::ranges::all_of(apart, [&](const Contender& other) {
             return angle_between(c.fit.T_camera_body.q, other.fit.T_camera_body.q) > 2 * kDegree;
         });
@@ -186,9 +187,10 @@ std::vector<PoseSearch::Contender> PoseSearch::coarse_fits(const Sought& sought,
     return apart;
 }
 
-/// From the hypothesis. Where steps end early, from either side of where they ended, with other samples.
-Result<DenseEstimate> PoseSearch::fine_fit(const Sought& sought, const Contender& contender, DenseOptions options,
-                                           SearchEstimate& out) {
+/// Fits from the hypothesis. If that does not converge, retries from both sides of the coarse result with other
+/// samples.
+Result<DenseEstimate> PoseSearch::fine_fit(const SearchState& sought, const Contender& contender,
+                                           DenseOptions options, SearchEstimate& out) {
     auto fit = dense_.align(sought.frame, sought.known.at, contender.start, options, sought.variance);
     for (const double side : {0.5, -0.5}) {
         if (!fit) return fit;
@@ -203,8 +205,8 @@ Result<DenseEstimate> PoseSearch::fine_fit(const Sought& sought, const Contender
     return fit;
 }
 
-/// Fits the contenders to the frame; the one with the least loss is the answer.
-Status PoseSearch::fine_fits(const Sought& sought, std::vector<Contender>& contenders, SearchEstimate& out) {
+/// Fits the contenders to the frame; the one with the smallest loss is the answer.
+Status PoseSearch::fine_fits(const SearchState& sought, std::vector<Contender>& contenders, SearchEstimate& out) {
     const SensorModel sensor = sensor_model(camera_);
     DenseOptions options = sought.dense;
     options.coarsest = sought.factor;
@@ -235,15 +237,15 @@ Status PoseSearch::fine_fits(const Sought& sought, std::vector<Contender>& conte
     Fit judged;
     observe(out.T_camera_target, out.covariance, judged);
     for (const Contender& c : contenders) {
-        if (&c == &best || c.loss - best.loss > kAsLikely) continue;
+        if (&c == &best || c.loss - best.loss > kRival_chi2) continue;
         const Vector6 apart = error_between(out.T_camera_target, c.fit.T_camera_body);
-        if (normalised_error_squared(apart, out.covariance) > kElsewhere)
+        if (normalised_error_squared(apart, out.covariance) > kDistinctPose_chi2)
             judged.rivals.push_back({c.fit.T_camera_body, std::max(0.0, c.loss - best.loss)});
     }
     const double range_m = norm(out.T_camera_target.t), slack_m = kRangeSigmas * position_sigma(out.covariance);
-    if (range_m < sought.known.least_m - slack_m || range_m > sought.known.most_m + slack_m)
-        judged.failed = fmt::format("a range of {:.4g} m, expected {:.4g} to {:.4g} m", range_m,
-                                    sought.known.least_m, sought.known.most_m);
+    if (range_m < sought.known.min_m - slack_m || range_m > sought.known.max_m + slack_m)
+        judged.failed = fmt::format("a range of {:.4g} m, expected {:.4g} to {:.4g} m", range_m, sought.known.min_m,
+                                    sought.known.max_m);
     if (!noise_known || !judged.failed.empty() || !judged.rivals.empty()) out.answer = judge(std::move(judged));
     return Ok{};
 }

@@ -1,11 +1,11 @@
 /// estimator/search/pose_search.h - the pose of a target in a frame without a guess: any attitude, anywhere in the
 /// image, at a range that is roughly known.
 ///
-/// The camera's attitude is known, and so the light in its axes; the target's is not. Attitudes all over SO(3) are
-/// rendered small and compared with the frame (template_matcher.h); the best are improved by steps of attitude,
-/// then by all pixels of a coarse image (dense/), and those that the frame does not exclude there by all pixels of
-/// the frame. The answer is the one with the least loss, tested as each dense answer; poses elsewhere that explain
-/// the frame as well make it ambiguous.
+/// The camera's attitude is known, and so is the light in its axes; the target's attitude is not. Attitudes all
+/// over SO(3) are rendered small and compared with the frame (template_matcher.h). The best are refined by steps of
+/// attitude, then fitted to all pixels of a coarse image (dense/); those that remain likely are fitted to all
+/// pixels of the frame. The answer is the pose with the smallest loss, tested like any dense answer; other poses
+/// that explain the frame as well make it ambiguous.
 #pragma once
 
 #include <span>
@@ -17,11 +17,11 @@ namespace narpa {
 
 struct SearchOptions {
     double range_m = 0;       ///< to the target's origin, as far as it is known
-    double range_part = 0.3;  ///< it may be off by this part of it
+    double range_part = 0.3;  ///< its relative uncertainty
     int attitudes = 4400;     ///< rendered at first: 15 degrees apart
-    int kept = 48;            ///< of them, improved by steps of attitude
-    int finished = 8;         ///< of them, fitted to all pixels of a coarse image
-    int fewest_pixels = 40;   ///< refused where fewer stand out against the background
+    int kept = 48;            ///< of these, refined by steps of attitude
+    int finished = 8;         ///< of these, fitted to all pixels of a coarse image
+    int fewest_pixels = 40;   ///< refuses a frame in which fewer stand out against the background
     DenseOptions dense{};     ///< its T_world_camera is not used
 };
 
@@ -30,7 +30,7 @@ struct SearchEstimate {
     Matrix6 covariance = Matrix6::Zero(), covariance_of_model = Matrix6::Zero();  ///< DenseEstimate's
     Answer answer;
     int templates = 0;   ///< small renders
-    int renders = 0;     ///< images that were compared by all pixels
+    int renders = 0;     ///< images compared pixel by pixel
     int contenders = 0;  ///< poses that were fitted to all pixels of the frame
     std::size_t pixels = 0;
     double residual = 0;
@@ -58,11 +58,12 @@ public:
 
 private:
     struct Contender;
-    struct Sought;
-    [[nodiscard]] std::vector<Contender> coarse_fits(const Sought& sought, SearchEstimate& out);
-    [[nodiscard]] Result<DenseEstimate> fine_fit(const Sought& sought, const Contender& contender,
+    struct SearchState;
+    [[nodiscard]] std::vector<Contender> coarse_fits(const SearchState& sought, SearchEstimate& out);
+    [[nodiscard]] Result<DenseEstimate> fine_fit(const SearchState& sought, const Contender& contender,
                                                  DenseOptions options, SearchEstimate& out);
-    [[nodiscard]] Status fine_fits(const Sought& sought, std::vector<Contender>& contenders, SearchEstimate& out);
+    [[nodiscard]] Status fine_fits(const SearchState& sought, std::vector<Contender>& contenders,
+                                   SearchEstimate& out);
 
     const RenderScene& render_scene_;
     Camera camera_;  ///< without an embedded line

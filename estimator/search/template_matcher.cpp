@@ -8,17 +8,17 @@
 namespace narpa {
 namespace {
 
-/// A pixel stands out by so many standard deviations of its noise, and by this part of the light behind it.
+/// A pixel stands out by kStandsOut standard deviations of its noise plus this part of the background.
 constexpr double kStandsOut = 5, kBackgroundPart = 0.03;
-/// Target's extent, px, in the image in which it is looked for.
+/// Target's extent, px, in the image in which the bright region is searched.
 constexpr double kFindExtent_px = 24;
-/// The window of a render, in parts of the target's extent.
+/// Side of the rendered window over the target's extent.
 constexpr double kWindowPart = 1.6;
-/// Brightness of a hypothesis over that of the model: exposure and albedo are known to so much.
-constexpr double kLeastBrightness = 0.8, kMostBrightness = 1.25;
-constexpr double kMostScale = 2;
+/// Range of the ratio of the frame's brightness to the model's: uncertainty of exposure and albedo.
+constexpr double kMinBrightness = 0.8, kMaxBrightness = 1.25;
+constexpr double kMaxScale = 2;
 
-/// Out of sight, and without a shadow on what is seen.
+/// A pose outside the view that casts no shadow into it.
 Rigid3 out_of_sight(double radius_m) {
     return {{}, {0, 0, -1e5 * radius_m}};
 }
@@ -69,7 +69,7 @@ std::optional<BrightRegion> find_bright_region(const SearchView& known, const Me
         const double noise = std::sqrt(sensor.variance_dn2(expected)) / factor;
         if (over > kStandsOut * noise + kBackgroundPart * (expected - sensor.black_dn)) light[p] = over;
     }
-    // A pixel alone is a defect or a star.
+    // An isolated pixel is a defect or a star.
     const auto beside = [&](int x, int y) {
         int n = 0;
         for (int j = std::max(0, y - 1); j <= std::min(y + 1, image.height - 1); ++j)
@@ -127,14 +127,14 @@ double TemplateMatcher::light_of(const RadianceImage& image, std::size_t p) cons
     return noise_(sensor_.dn(image.pixels[p])) - background_[p];
 }
 
-/// Of a square in the frame, template pixels.
+/// Mean light of a square in the frame, in template pixels.
 double TemplateMatcher::frame_light(double x, double y, double side) const {
     const auto nearest = [this](double v) { return std::clamp(static_cast<int>(std::lround(v)), 0, side_ - 1); };
     const auto p = static_cast<std::size_t>(nearest(y) * side_ + nearest(x));
     return noise_(frame_.mean(sensor_px(x, left_), sensor_px(y, top_), side / scale_)) - background_[p];
 }
 
-/// Of what stands out, within the frame.
+/// Centroid and spread of the pixels that stand out within the frame.
 TemplateMatcher::Spread TemplateMatcher::spread(const std::vector<double>& light) const {
     const double least = kStandsOut * scale_;
     double sum = 0, squares = 0;
@@ -169,8 +169,8 @@ Hypothesis TemplateMatcher::Worker::compare(const Rigid3& T) {
     if (!rendered.any() || !seen.any()) return out;
 
     const double range_m = norm(T.t);
-    double k = std::clamp(seen.radius / rendered.radius, range_m / known.most_m, range_m / known.least_m);
-    k = std::clamp(k, 1 / kMostScale, kMostScale);
+    double k = std::clamp(seen.radius / rendered.radius, range_m / known.max_m, range_m / known.min_m);
+    k = std::clamp(k, 1 / kMaxScale, kMaxScale);
     double both = 0, own = 0;
     for (int y = 0; y < m_.side_; ++y)
         for (int x = 0; x < m_.side_; ++x) {
@@ -181,7 +181,7 @@ Hypothesis TemplateMatcher::Worker::compare(const Rigid3& T) {
             both += light * m_.frame_light(u, v, k), own += light * light;
         }
     if (!(own > 0)) return out;
-    const double gain = std::clamp(both / own, std::sqrt(kLeastBrightness), std::sqrt(kMostBrightness));
+    const double gain = std::clamp(both / own, std::sqrt(kMinBrightness), std::sqrt(kMaxBrightness));
     out.misfit = 1 - (2 * gain * both - gain * gain * own) * k * k / seen.energy;
 
     const CameraModelHandle model(m_.camera_);

@@ -76,23 +76,24 @@ using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
 constexpr int kIterationsMax = 20;
 constexpr double kSettled_px = 1e-4, kFarthest_px = 1.5;
-/// What neither plane nor curvature describes of where a pixel lies in the other image, interpolation and its
-/// aliases among it: each pixel for itself. Measured on scenes/descent, where it makes the scatter across epipolar
-/// lines, which relief does not touch, the predicted one at a quarter to twice the exposure.
+/// Error of a pixel's position in the other image that neither plane nor curvature describes, including
+/// interpolation and aliasing; independent between pixels. Measured on scenes/descent: with it the predicted
+/// scatter across epipolar lines, which relief does not affect, equals the measured one at a quarter to twice the
+/// exposure.
 constexpr double kUnexplained_px = 0.06;
-/// How far ground that is no plane may move the image of a patch's edge: craters of scenes/descent do.
+/// How far ground that is not flat may move the image of a patch's edge, as craters of scenes/descent do.
 constexpr double kCurvature_px = 0.1;
-/// Weights of an image's pixel and its neighbours each way before it is interpolated: they take the frequencies
-/// that a step between two pixels has aliased, and this part of the variance of noise.
+/// Low-pass filter before interpolation: weights of a pixel and its neighbours each way. It removes the frequencies
+/// that alias at a step between two pixels, and reduces the variance of noise to kSoftNoise.
 constexpr double kNeighbour = 0.125, kMiddle = 1 - 2 * kNeighbour;
 constexpr double kSoftNoise =
     (kMiddle * kMiddle + 2 * kNeighbour * kNeighbour) * (kMiddle * kMiddle + 2 * kNeighbour * kNeighbour);
 /// Correlations that differ by less than this are the same.
 constexpr double kAlike = 1e-3;
-/// Pixels nearer to the top than this are taken as full.
+/// Pixels above this part of the largest value count as saturated.
 constexpr double kFull = 0.98;
 
-/// False as soon as a visit is.
+/// Stops and returns false when a visit returns false.
 template <class Visit>  // bool(Vector2d offset, double dn)
 bool for_each_pixel(const Patch& patch, Visit visit) {
     const double* dn = patch.dn.data();
@@ -114,7 +115,8 @@ private:
     double n_ = 0, a_ = 0, b_ = 0, aa_ = 0, bb_ = 0, ab_ = 0;
 };
 
-/// Of the patch with what the other image shows where a facing plane would have it, moved by `shift`.
+/// Correlation of the patch with the other image, sampled where a camera-facing plane would appear, moved by
+/// `shift`.
 std::optional<double> correlation(const Patch& patch, const EpipolarWarp& warp, const StereoView& there,
                                   double inverse_depth, const Vector2d& shift) {
     Correlation c;
@@ -149,7 +151,7 @@ public:
           inverse_depth_(inverse_depth),
           per_px_(1 / warp.px_slope(warp.ray(patch.centre_px()), inverse_depth).norm()) {}
 
-    /// Where the middle lies without a shift.
+    /// Image of the patch's centre without a shift.
     [[nodiscard]] Vector2d start_px() const { return warp_.px(warp_.ray(patch_.centre_px()), inverse_depth_); }
 
     /// Nothing where the patch leaves the other image.

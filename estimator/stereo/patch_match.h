@@ -20,7 +20,7 @@ public:
         double dn = 0;
         Eigen::Vector2d gradient{0, 0};  ///< DN per px
     };
-    /// At a point that `holds` with a margin of kMargin_px, else undefined.
+    /// At a point for which holds() is true, else undefined.
     [[nodiscard]] Sample sample(const Eigen::Vector2d& px) const;
 
     static constexpr int kMargin_px = 2;
@@ -41,7 +41,7 @@ public:
     [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& px) const {
         return origin_ + px.x() * across_ + px.y() * down_;
     }
-    /// Is the point in front of the other camera?
+    /// True if the point is in front of the other camera.
     [[nodiscard]] bool is_before(const Eigen::Vector3d& ray, double inverse_depth) const {
         return ray.z() + inverse_depth * t_.z() > 0;
     }
@@ -100,7 +100,8 @@ struct WholePixelMatch {
     Eigen::Vector2d px{0, 0};  ///< whole
     double inverse_depth = 0;  ///< of the point of the epipolar line nearest to it
     double correlation = 0;    ///< normalised: -1 .. 1
-    /// (1 - correlation) over the same of the best that lies at least kApart_px away: near 0 is unique, 1 is not.
+    /// (1 - correlation) over that of the best match at least kApart_px away: near 0 is unique, near 1 is
+    /// ambiguous.
     double ambiguity = 0;
 };
 inline constexpr double kApart_px = 3;
@@ -113,7 +114,7 @@ inline constexpr double kApart_px = 3;
 struct SubPixelMatch {
     Eigen::Vector2d px{0, 0};
     Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
-    /// Squared residuals over what is expected of them. The covariance has grown by it where it is above 1.
+    /// Sum of squared residuals over its expected value. Above 1 it scales the covariance.
     double misfit = 0;
 };
 

@@ -9,11 +9,11 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Corners down to this part of the strongest one's eigenvalue, over blocks of so many pixels.
-constexpr double kLeastStrength = 1e-4;
+/// Eigenvalue of the weakest corner over that of the strongest; block size of corners, px.
+constexpr double kMinStrength = 1e-4;
 constexpr int kCornerBlock_px = 5, kCornersPerPoint = 10;
 constexpr int kCornersApart_px = 12;
-/// Of an exact pixel: small beside any match, large beside rounding.
+/// Standard deviation of an exact pixel: small beside any match, large beside rounding.
 constexpr double kExact_px = 1e-4;
 /// Largest left-right-left error of the whole-pixel search.
 constexpr double kStereoRoundTrip_px = 1.5;
@@ -41,8 +41,8 @@ Camera as_pinhole(Camera camera) {
     return camera;
 }
 
-/// As as_pinhole(camera) would have taken it. Pixels of which the frame has nothing are saturated: no patch is cut
-/// there.
+/// The image as as_pinhole(camera) would have taken it. Pixels outside the frame are marked as saturated, so that
+/// no patch is cut there.
 MeasuredImage through_pinhole(const Camera& camera, const MeasuredImage& image) {
     const CameraModelHandle lens(camera);
     if (lens->pinhole() != nullptr) return image;
@@ -65,7 +65,7 @@ MeasuredImage through_pinhole(const Camera& camera, const MeasuredImage& image) 
 std::vector<cv::Point2f> corners(const MeasuredImage& image, const StereoSettings& settings) {
     const cv::Mat pixels(image.height, image.width, CV_32F, const_cast<float*>(image.dn.data()));
     std::vector<cv::Point2f> found;
-    cv::goodFeaturesToTrack(pixels, found, kCornersPerPoint * settings.points_max, kLeastStrength, kCornersApart_px,
+    cv::goodFeaturesToTrack(pixels, found, kCornersPerPoint * settings.points_max, kMinStrength, kCornersApart_px,
                             {}, kCornerBlock_px);
     return found;
 }
@@ -87,8 +87,8 @@ public:
         const InverseDepths range{1 / settings_.farthest_m, 1 / settings_.nearest_m};
         const auto whole = search_line(patch_, there_, right_, range);
         if (!whole) return void(++n.cut_off);
-        if (whole->correlation < kLeastCorrelation) return void(++n.unlike);
-        if (whole->ambiguity > kMostAmbiguity) return void(++n.ambiguous);
+        if (whole->correlation < kMinCorrelation) return void(++n.unlike);
+        if (whole->ambiguity > kMaxAmbiguity) return void(++n.ambiguous);
         if (!is_consistent(*whole, range)) return void(++n.inconsistent);
         const auto match = fit_patch(patch_, left_, there_, right_, *whole);
         if (!match) return void(++n.unsettled);

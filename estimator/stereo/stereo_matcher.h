@@ -9,9 +9,9 @@
 /// 0.029 and 0.015, where the predicted variance is 1.5 times too small. They are limited by relief within a patch,
 /// along the line, and by aliasing.
 ///
-/// Frames through lenses that distort are first resampled (bicubic) as pinholes with the same focal lengths and
-/// principal points would have taken them, as epipolar lines must be straight. Pixels of StereoPoint then count in
-/// these, and what only the lens sees is not matched.
+/// Frames of distorting lenses are first resampled (bicubic) to the images of pinholes with the same focal lengths
+/// and principal points, as epipolar lines must be straight. Pixels of StereoPoint refer to these images; points
+/// outside them are not matched.
 #pragma once
 
 #include <vector>
@@ -34,18 +34,18 @@ struct StereoPoint {
     TriangulatedPoint point;        ///< from `match`
 };
 
-/// Outcomes of the corners.
+/// Number of corners by outcome.
 struct StereoCounts {
     int accepted = 0;
     int cut_off = 0;       ///< the patch, or all of its epipolar line, is outside a frame or saturated
-    int unlike = 0;        ///< correlation below kLeastCorrelation
+    int unlike = 0;        ///< correlation below kMinCorrelation
     int ambiguous = 0;     ///< another place along the line correlates nearly as well
     int inconsistent = 0;  ///< the search from the right frame ends elsewhere in the left one
     int unsettled = 0;     ///< the subpixel fit does not converge
     int off_line = 0;      ///< more than kFarthestOff_sigmas from the epipolar line
     int without_depth = 0;
 };
-inline constexpr double kLeastCorrelation = 0.8, kMostAmbiguity = 0.7, kFarthestOff_sigmas = 3;
+inline constexpr double kMinCorrelation = 0.8, kMaxAmbiguity = 0.7, kFarthestOff_sigmas = 3;
 
 struct StereoPoints {
     std::vector<StereoPoint> points;

@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 constexpr int kNewtonStepsMax = 20, kHalvingsMax = 10;
-/// What cancels to this part of its terms is rounding.
+/// A difference below this part of its terms is rounding.
 constexpr double kRounding = 1e-12;
 
 /// Direction of a pixel's ray, z = 1.
@@ -26,7 +26,8 @@ Vector3d ray_through(const CameraModelHandle& camera, const Vector2d& px) {
     return to_eigen(camera->on_plane({px.x(), px.y()}));
 }
 
-/// Of the line through the camera's centre and the point, which may lie behind it; not finite where it has none.
+/// Image of the line through the camera's centre and the point, which may be behind it; not finite if there is
+/// none.
 Vector2d image_of_line(const CameraModel& camera, const Vector3d& p) {
     const auto image = camera.project(to_vec3(p.z() < 0 ? Vector3d(-p) : p));
     return image ? Vector2d(image->x, image->y) : Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
@@ -60,7 +61,7 @@ public:
           left_weight_(left.covariance_px2.inverse()),
           right_weight_(right.covariance_px2.inverse()) {}
 
-    /// Where the left ray passes the right one closest, by the angle seen from the right camera.
+    /// Point of the left ray closest to the right one, by the angle seen from the right camera.
     [[nodiscard]] Vector3d first_guess() const {
         const Vector3d l = ray_through(left_, left_px_), r = ray_through(right_, right_px_);
         const Vector3d turned = r.cross(R_ * l), moved = r.cross(t_);
@@ -149,7 +150,7 @@ TriangulatedPoint triangulate(const StereoPair& pair, const PixelMeasurement& le
     out.inverse_depth_1_m = s.z();
     out.sigma_inverse_depth_1_m = std::sqrt(C(2, 2));
     out.epipolar_sigmas = std::sqrt(cost);
-    if (!(std::abs(s.z()) >= kLeastParallax_sigmas * out.sigma_inverse_depth_1_m)) return out;
+    if (!(std::abs(s.z()) >= kMinParallax_sigmas * out.sigma_inverse_depth_1_m)) return out;
     const bool before_both = s.z() > 0 && views.in_right(s).z() > 0;
     out.status = before_both ? TriangulationStatus::good : TriangulationStatus::behind_camera;
     out.point_m = Vector3d(s.x(), s.y(), 1) / s.z();

@@ -30,8 +30,7 @@ enum class TriangulationStatus : std::uint8_t {
     good,
     behind_camera,  ///< the rays meet behind one of the cameras
     no_parallax,    ///< its depth is compatible with infinity: short baseline, far point, or on the baseline itself
-    bad_input,  ///< not finite, a covariance that is not positive definite, a quaternion or focal length that is
-                ///< none
+    bad_input,      ///< not finite, not positive definite, no unit quaternion, or no focal length
 };
 
 struct TriangulatedPoint {
@@ -46,7 +45,7 @@ struct TriangulatedPoint {
 };
 
 /// The inverse depth must be this many standard deviations from zero, or there is no parallax.
-inline constexpr double kLeastParallax_sigmas = 3;
+inline constexpr double kMinParallax_sigmas = 3;
 
 /// Maximum-likelihood point for Gaussian errors of both pixels: Gauss-Newton on its direction and its inverse depth
 /// in the left frame, where the projections are nearly linear. The covariance is the Cramer-Rao bound at the

@@ -12,14 +12,14 @@ namespace {
 
 /// A pixel is lit if its signal is above 10 % of the 99th percentile and above five standard deviations of noise.
 constexpr double kLitPart = 0.1, kBrightPart = 0.01, kLitSigmas = 5;
-/// The frame's black is its own where the render shows nothing in at least this part of the pixels.
+/// The black level is taken from the frame if the render is empty in at least this part of the pixels.
 constexpr double kEmptyPart = 0.01;
 /// Variances below this part of the squares are rounding.
 constexpr double kUniform = 1e-12;
-/// The light is compared again without what is too bright for the frame.
+/// Rounds of the light ratio, each without the pixels that are too bright for the frame.
 constexpr int kGainRounds = 4;
 
-/// The value that this part of the largest `count` of them exceed.
+/// The value exceeded by this part of the `count` largest values.
 double exceeded_by(double part, std::size_t count, std::vector<double> values) {
     count = std::min(count, values.size());
     if (count == 0) return 0;
@@ -28,7 +28,7 @@ double exceeded_by(double part, std::size_t count, std::vector<double> values) {
     return *place;
 }
 
-/// Numbers are rounded, so that their median is off by up to half a step: it only finds what is background.
+/// DN are rounded, so that their median is off by up to half a step: it only serves to select background pixels.
 double black_of(const MeasuredImage& frame, const SensorModel& sensor, const ExpectedFrame& render) {
     std::vector<double> background;
     for (std::size_t p = 0; p < frame.dn.size(); ++p)
@@ -55,7 +55,7 @@ std::vector<std::uint8_t> above(double least, const std::vector<double>& signal)
     return out;
 }
 
-/// Light of the frame over that of the render in the usable pixels that one of them lights, up to `most` DN.
+/// Ratio of the frame's light to the render's in the usable pixels that either lights, up to `most` DN.
 double light_ratio(const Signals& s, const std::vector<std::uint8_t>& usable, double most) {
     double gain = 0, limit = INFINITY;
     for (int round = 0; round < kGainRounds; ++round) {
@@ -70,7 +70,7 @@ double light_ratio(const Signals& s, const std::vector<std::uint8_t>& usable, do
     return gain;
 }
 
-/// The rectangle of what is lit, with a border of two pixels within the image.
+/// Bounding rectangle of the lit pixels, with a border of two pixels within the image.
 cv::Rect extent(const std::vector<std::uint8_t>& lit, int width, int height) {
     int left = width, top = height, right = -1, bottom = -1;
     for (int y = 0; y < height; ++y)
@@ -83,13 +83,13 @@ cv::Rect extent(const std::vector<std::uint8_t>& lit, int width, int height) {
     return {left, top, std::min(width, right + 3) - left, std::min(height, bottom + 3) - top};
 }
 
-/// Of a parabola through three neighbouring values, from the middle one.
+/// Position of the peak of a parabola through three neighbouring values, relative to the middle one.
 double peak(double before, double at, double after) {
     const double bend = before - 2 * at + after;
     return bend < 0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0;
 }
 
-/// `most`: of the render, where the frame clips.
+/// `most`: signal of the render at which the frame clips.
 std::optional<FrameComparison::Shift> find_shift(const Signals& s, double most, int width, int height) {
     const auto image = [&](const std::vector<double>& signal, double limit) {
         cv::Mat m(height, width, CV_32F);
@@ -97,21 +97,21 @@ std::optional<FrameComparison::Shift> find_shift(const Signals& s, double most, 
                                [limit](double v) { return static_cast<float>(std::min(v, limit)); });
         return m;
     };
-    constexpr int kMost = kMostComparedShift_px;
+    constexpr int kMax = kMaxComparedShift_px;
     const cv::Rect box = extent(s.lit_render, width, height);
     const cv::Mat render = image(s.render, most)(box);
     double low = 0, high = 0;
     cv::minMaxLoc(render, &low, &high);
     if (!(high - low > 1e-6 * high)) return {};
     cv::Mat wide, match;
-    cv::copyMakeBorder(image(s.frame, INFINITY), wide, kMost, kMost, kMost, kMost, cv::BORDER_CONSTANT, 0);
-    cv::matchTemplate(wide({box.x, box.y, box.width + 2 * kMost, box.height + 2 * kMost}), render, match,
+    cv::copyMakeBorder(image(s.frame, INFINITY), wide, kMax, kMax, kMax, kMax, cv::BORDER_CONSTANT, 0);
+    cv::matchTemplate(wide({box.x, box.y, box.width + 2 * kMax, box.height + 2 * kMax}), render, match,
                       cv::TM_CCOEFF_NORMED);
     FrameComparison::Shift out;
     cv::Point best;
     cv::minMaxLoc(match, nullptr, &out.correlation, nullptr, &best);
-    out.x_px = best.x - kMost, out.y_px = best.y - kMost;
-    out.is_at_limit = std::max(std::abs(best.x - kMost), std::abs(best.y - kMost)) == kMost;
+    out.x_px = best.x - kMax, out.y_px = best.y - kMax;
+    out.is_at_limit = std::max(std::abs(best.x - kMax), std::abs(best.y - kMax)) == kMax;
     if (out.is_at_limit) return out;
     const auto at = [&](int dx, int dy) { return static_cast<double>(match.at<float>(best.y + dy, best.x + dx)); };
     out.x_px += peak(at(-1, 0), at(0, 0), at(1, 0));
@@ -119,7 +119,7 @@ std::optional<FrameComparison::Shift> find_shift(const Signals& s, double most, 
     return out;
 }
 
-/// Of the brightness in these pixels.
+/// Compares the brightness in these pixels.
 void compare_brightness(const Signals& s, const std::vector<std::size_t>& pixels, const SensorModel& sensor,
                         const std::vector<float>& variance, FrameComparison& out) {
     double n = 0, f = 0, r = 0, ff = 0, fr = 0, rr = 0;

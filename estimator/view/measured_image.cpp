@@ -33,9 +33,9 @@ double step_dn(const Camera& camera) {
 /// Standard deviations of read noise by which a full well may come out below its mean.
 constexpr double kReadSigmas = 4;
 
-/// Each pixel becomes the mean of its neighbourhood with the weights [1 2 1] x [1 2 1] / 16, which has a quarter of
-/// red, half of green and a quarter of blue wherever it stands, clipped where one of the nine is. The image is
-/// mirrored at its edges, which keeps the bands' places.
+/// Each pixel becomes the mean of its neighbourhood with the weights [1 2 1] x [1 2 1] / 16, which gives a quarter
+/// of red, half of green and a quarter of blue at every position; clipped if one of the nine is. The image is
+/// mirrored at its edges, which preserves the mosaic's pattern.
 void without_mosaic(MeasuredImage& image) {
     const std::vector<float> mosaic = image.dn;
     const std::vector<std::uint8_t> clipped = image.clipped;
@@ -103,7 +103,7 @@ SensorModel sensor_model(const Camera& camera) {
     const double well_dn = d.black_level_dn + d.full_well_e * dn_per_e;
     s.top_dn = std::min(converter_top, std::floor(well_dn + 0.5));
     s.clips_dn = std::min(converter_top, well_dn - kReadSigmas * d.read_noise_e * dn_per_e);
-    if (!is_16_bit(camera.format)) {  // what its truncated bytes stand for
+    if (!is_16_bit(camera.format)) {  // centre of the last byte's interval
         const double byte = std::exp2(converter_bits(camera) - 8);
         s.top_dn = std::floor(s.top_dn / byte) * byte + 0.5 * (byte - 1);
     }

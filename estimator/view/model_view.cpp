@@ -9,7 +9,7 @@ Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::si
     return T_world_camera;
 }
 
-void stand_still(const BodyPoses& moving, BodyPoses& at) {
+void copy_static_poses(const BodyPoses& moving, BodyPoses& at) {
     for (std::size_t i = 0; i < moving.T_world_body.size(); ++i) at.set(i, moving.T_world_body[i]);
 }
 

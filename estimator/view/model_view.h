@@ -18,10 +18,11 @@ namespace narpa {
 [[nodiscard]] Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target,
                                   BodyPoses& at);
 
-/// All bodies as they are in mid-exposure: a target's motion is the camera's (camera_path).
-void stand_still(const BodyPoses& moving, BodyPoses& at);
+/// Copies all poses as of mid-exposure without their motion: the target's motion is applied to the camera
+/// (camera_path).
+void copy_static_poses(const BodyPoses& moving, BodyPoses& at);
 
-/// The scene's stars are left out: they have nothing of the target.
+/// Leaves out the scene's stars, as they are not part of the target.
 class ModelView {
 public:
     /// `render_scene` outlives it. `target`: index of the body whose pose is estimated. `at`: where every body is
@@ -30,7 +31,7 @@ public:
 
     /// Another frame: poses of all bodies, the target's motion in camera axes, and when rows are exposed.
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times) {
-        stand_still(at, at_);
+        copy_static_poses(at, at_);
         motion_ = times.at_once() ? ApparentMotion{} : motion, times_ = times;
     }
 
@@ -57,9 +58,9 @@ public:
     void trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept;
 
 private:
-    /// Moves the camera there; its path during the exposure.
+    /// Places the camera for this pose and returns its path during the exposure.
     CameraPose place(const Rigid3& T_camera_target);
-    /// In the middle of the row's exposure.
+    /// Pose in the middle of the row's exposure.
     [[nodiscard]] Rigid3 T_world_camera(double row) const noexcept;
 
     const RenderScene& render_scene_;

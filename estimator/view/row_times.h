@@ -10,7 +10,7 @@
 
 namespace narpa {
 
-/// Seconds from the middle of the frame's exposure, the time of its pose. All 0: the frame is of that moment.
+/// Seconds from the middle of the frame's exposure, the time of its pose. All 0: all rows at that instant.
 struct RowTimes {
     double middle_s = 0;    ///< of the first row's exposure
     double row_s = 0;       ///< from the middle of a row's to the next one's
@@ -18,9 +18,9 @@ struct RowTimes {
 
     [[nodiscard]] bool at_once() const noexcept { return row_s == 0 && exposure_s == 0; }
     [[nodiscard]] double at(double row) const noexcept { return middle_s + row * row_s; }
-    /// Of the rows from this one on.
+    /// Times of the rows from this one on.
     [[nodiscard]] RowTimes from(double row) const noexcept { return {at(row), row_s, exposure_s}; }
-    /// Of an image whose rows are each `factor` of these; below 1: parts of a row.
+    /// Times of an image whose rows are each `factor` of these; below 1: parts of a row.
     [[nodiscard]] RowTimes scaled(double factor) const noexcept;
     /// Each row's exposure shortened to part k of n.
     [[nodiscard]] RowTimes part(int k, int n) const noexcept;
@@ -34,10 +34,10 @@ struct RowTimes {
 [[nodiscard]] CameraPose camera_path(const Rigid3& T_world_target, const Rigid3& T_camera_target,
                                      const ApparentMotion& motion, const RowTimes& times, int rows);
 
-/// Moves points of the body, which were measured at these pixels of rows exposed one after the other, to where a
-/// camera that exposes all rows at once would have to find them to see them at the same pixels in the middle of the
-/// exposure. For solvers that know one pose a frame (pnp.h): solve, move the points with that pose, and solve
-/// again. Spans of one length.
+/// Corrects body points for a rolling shutter: moves each point, measured at its pixel in a row with its own
+/// exposure time, so that a camera exposing all rows at mid-exposure would see it at the same pixel. For solvers
+/// with one pose per frame (pnp.h): solve, move the points with that pose, and solve again. The spans have equal
+/// lengths.
 void to_mid_exposure(const Rigid3& T_camera_target, const ApparentMotion& motion, const RowTimes& times,
                      std::span<const Pixel> pixels, std::span<Vec3> body_m) noexcept;
 

@@ -21,11 +21,11 @@ struct CandumpLine {
 
 inline constexpr std::size_t kCandumpMaxLine = 224;
 
-/// The error report that stands in a log for frames left out of it. Source: linux/can/error.h, CAN_ERR_CRTL with
+/// The error report that marks frames left out of a log. Source: linux/can/error.h, CAN_ERR_CRTL with
 /// CAN_ERR_CRTL_RX_OVERFLOW; their number, little-endian, is in bytes 4..7, which this report does not use.
 [[nodiscard]] CanFrame lost_frames(std::uint32_t count) noexcept;
 
-/// Returns nullptr when the line (without its line end) is good, else what was expected; `out` is then as it was.
+/// Returns nullptr when the line (without its line end) is good, else what was expected; `out` is then unchanged.
 [[nodiscard]] const char* parse_candump(std::string_view line, CandumpLine& out) noexcept;
 
 /// Writes the line with its LF, microseconds as candump does and a time before 0 as 0; `interface` at most 15

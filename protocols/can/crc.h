@@ -7,7 +7,7 @@
 
 namespace narpa {
 
-/// Of each byte: its remainder after division by the polynomial.
+/// For each byte: its remainder after division by the polynomial.
 template <class Word>
 [[nodiscard]] constexpr std::array<Word, 256> crc_table(Word polynomial) {
     constexpr int kBits = 8 * sizeof(Word);

@@ -38,7 +38,7 @@ struct Sections {
         comments += "CM_ BO_ " + id_ + " \"" + std::string(comment) + "\";\n";
         attributes += "BA_ \"VFrameFormat\" BO_ " + id_ + (fd ? " 14" : " 0") + ";\n";
     }
-    void signal(const Signal& s, const BitPlace& at, std::string_view receiver) {
+    void signal(const Signal& s, const BitField& at, std::string_view receiver) {
         messages += " SG_ " + std::string(s.name) + " : " + std::to_string(at.start_bit) + "|" +
                     std::to_string(at.length) + "@1" + (s.is_signed ? "-" : "+") + " (" +
                     number(1.0 / s.steps_per_unit) + ",0) [" +

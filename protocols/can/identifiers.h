@@ -27,7 +27,7 @@ inline constexpr std::uint32_t kCameraReplyBaseId = 0x780, kCameraStateBaseId = 
 inline constexpr std::uint32_t kLidarBeamBaseId = 0x7A0;                                    ///< from LiDARs
 inline constexpr std::uint32_t kSyncId = 0x080;  ///< CiA 301: the SYNC object
 
-/// Of a message between navigation and dynamics.
+/// True for messages between navigation and dynamics.
 [[nodiscard]] constexpr bool is_closed_loop(std::uint32_t id) noexcept {
     return id >= kActuatorBaseId && id < kDynamicsBaseId + kBaseIdStep;
 }

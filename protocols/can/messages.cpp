@@ -20,7 +20,7 @@ constexpr std::size_t index_of(SignalTable signals, std::string_view name) {
     return static_cast<std::size_t>(std::ranges::find(signals, name, &Signal::name) - signals.begin());
 }
 
-/// The part of a time that travels.
+/// The low bits of a time, which are sent.
 std::int64_t time_steps(std::int64_t t_ns) noexcept {
     return t_ns & raw_max(false, kTimeBits);
 }
@@ -40,8 +40,8 @@ struct RawWriter {
     RawSignals raw{};
     std::size_t i = 0;
 
-    /// In the signal's steps, within its range. What is not finite is not available, and saturated in unsigned
-    /// signals.
+    /// Scales a value to the signal's steps and clamps it to the signal's range. A value that is not finite becomes
+    /// "not available", in unsigned signals the maximum.
     void put(double value) noexcept {
         const Signal& s = signals[i];
         const std::int64_t limit = raw_max(s.is_signed, s.classic.length);
@@ -61,7 +61,7 @@ struct RawWriter {
     }
 };
 
-/// The way back.
+/// Raw signals to values.
 struct RawReader {
     SignalTable signals;
     const RawSignals& raw;
@@ -72,14 +72,14 @@ struct RawReader {
         const double steps = static_cast<double>(raw[i]);
         return steps / signals[i++].steps_per_unit;
     }
-    /// As it travelled: not normalised.
+    /// As received: not normalised.
     Quat attitude() noexcept {
         Quat q;
         q.w = number(), q.x = number(), q.y = number(), q.z = number();
         return q;
     }
     void get(std::int64_t& t_ns) noexcept { t_ns = time_of(raw[i++], t_reference_ns); }
-    /// Not a number where it is not available.
+    /// NaN where it is not available.
     void get(double& value) noexcept {
         const bool known = raw[i] != kNotAvailable;
         value = number();
@@ -103,7 +103,7 @@ bool has_known_choices(const RawSignals& raw, SignalTable signals) noexcept {
     return true;
 }
 
-/// Every quantity is there, every choice is a known one, the quaternion is a rotation.
+/// Refuses missing quantities, unknown choices, and quaternions that are no rotation.
 template <const SetLayout& kLayout>
 DecodeStatus check(const RawSignals& raw) noexcept {
     constexpr SignalTable signals = kLayout.signals;
@@ -120,7 +120,7 @@ DecodeStatus check(const RawSignals& raw) noexcept {
 
 // --- Pose command -----------------------------------------------------------------------------------------------
 
-EncodeStatus quantise(const PoseCommand& command, BitPlace Signal::*form, RawSignals& raw) noexcept {
+EncodeStatus quantise(const PoseCommand& command, BitField Signal::*form, RawSignals& raw) noexcept {
     const auto& [T, v, w] = command.motion;
     if (!(std::abs(norm(T.q) - 1.0) <= kUnitTolerance))
         return {"AttitudeNorm", "", norm(T.q), 1.0 - kUnitTolerance, 1.0 + kUnitTolerance};
@@ -223,7 +223,7 @@ struct MemberCodec {
     static DecodeStatus check(const RawSignals& raw) noexcept { return narpa::check<kLayout>(raw); }
     static void read(const RawSignals& raw, std::uint8_t counter, std::int64_t t_reference_ns,
                      Message& out) noexcept {
-        out.*kCounter = counter;  // a frame or cycle number is a member of its own, and read whole
+        out.*kCounter = counter;  // where this is a frame or cycle number, its signal is read in full below
         RawReader reader{layout.signals, raw, t_reference_ns};
         (reader.get(out.*kMembers), ...);
     }
@@ -308,7 +308,7 @@ struct GetSetting {
     void operator()(bool& value) const noexcept { value = reader.raw[reader.i++] != 0; }
 };
 
-/// No choice is negative or unknown. Whether a camera can be set so is for the camera to decide.
+/// Refuses negative and unknown choices. Whether other values are possible is for the camera to decide.
 DecodeStatus check_command(const RawSignals& raw, SignalTable signals) noexcept {
     const auto is_negative = [&](std::size_t i) { return raw[i] < 0 && raw[i] != kNotAvailable; };
     for (std::size_t i = 0; i < signals.size(); ++i)
@@ -316,7 +316,7 @@ DecodeStatus check_command(const RawSignals& raw, SignalTable signals) noexcept 
     return has_known_choices(raw, signals) ? DecodeStatus::complete : DecodeStatus::not_a_number;
 }
 
-/// No value is negative but the gain, every choice is a known one, and every value fits its member.
+/// Refuses negative values (except of the gain), unknown choices, and values that do not fit their member.
 DecodeStatus check_settings(const RawSignals& raw, SignalTable signals) noexcept {
     if (!has_known_choices(raw, signals)) return DecodeStatus::not_a_number;
     for (std::size_t i = 0; i < signals.size(); ++i) {
@@ -426,7 +426,7 @@ constexpr std::size_t kExposureMid = index_of(kLedgerSignals, "ExposureMid"),
                       kPoseKnown = index_of(kLedgerSignals, "PoseKnown"),
                       kHandOver = index_of(kLedgerSignals, "HandOver");
 
-/// Of a time: after exposure mid.
+/// True for times that are sent relative to exposure mid.
 bool is_offset(const Signal& s) noexcept {
     return s.unit == "us";
 }

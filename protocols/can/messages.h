@@ -25,11 +25,11 @@ namespace narpa {
 
 struct PoseCommand {
     std::uint8_t counter = 0;     ///< +1 with every command of a body, wraps
-    std::int64_t t_valid_ns = 0;  ///< simulation clock; 48 bits of it travel
+    std::int64_t t_valid_ns = 0;  ///< simulation clock; its low 48 bits are sent
     Motion motion{};              ///< attitude: | |q| - 1 | <= 1e-3
 };
 
-/// Which quantity does not fit the wire; `operator bool` is true when all did.
+/// The quantity that does not fit the wire; `operator bool` is true if all fit.
 struct EncodeStatus {
     std::string_view quantity{};  ///< signal name of signals.h, or "AttitudeNorm"; empty: all is well
     std::string_view unit{};
@@ -73,7 +73,7 @@ private:
 enum class RunState : std::uint8_t { starting, running, lockstep, stopping };
 
 struct Heartbeat {
-    std::int64_t t_ns = 0;  ///< simulation clock; whole microseconds travel
+    std::int64_t t_ns = 0;  ///< simulation clock; sent in whole microseconds
     RunState state = RunState::starting;
     bool no_command = false, stale = false, deadline_missed = false, output_dropped = false;
     std::uint8_t counter = 0;  ///< +1 with every heartbeat, wraps
@@ -90,8 +90,8 @@ struct Heartbeat {
 /// DynamicsReport. The counter of a set is the message's own, or the low 8 bits of its frame or cycle number.
 /// Values beyond a signal's range saturate; numbers that are not finite are "not available".
 ///
-/// Ledger: times other than exposure mid and pose time travel as whole microseconds after exposure mid. Of the
-/// passes their number travels, not what each took: that is in the log. Estimate: in state `lost`, pose and
+/// Ledger: times other than exposure mid and pose time are sent as whole microseconds after exposure mid. Of the
+/// passes only their number is sent; the samples of each are in the log. Estimate: in state `lost`, pose and
 /// deviations are "not available" and are not read.
 template <class Message>
 [[nodiscard]] FrameSet encode_classic(const Message& message) noexcept;

@@ -30,7 +30,7 @@ std::uint64_t get_bits(std::span<const std::uint8_t> bytes, int start, int lengt
 
 /// The raw value of a signal; "not available" in a field of any length is kNotAvailable, so that both forms of a
 /// set give the same raw values.
-std::int64_t get_signal(std::span<const std::uint8_t> bytes, const Signal& signal, const BitPlace& at) noexcept {
+std::int64_t get_signal(std::span<const std::uint8_t> bytes, const Signal& signal, const BitField& at) noexcept {
     const std::uint64_t bits = get_bits(bytes, at.start_bit, at.length);
     if (!signal.is_signed) return static_cast<std::int64_t>(bits);
     const int shift = 64 - at.length;
@@ -38,7 +38,7 @@ std::int64_t get_signal(std::span<const std::uint8_t> bytes, const Signal& signa
     return raw == raw_not_available(at.length) ? kNotAvailable : raw;
 }
 
-void put_signal(std::span<std::uint8_t> bytes, const BitPlace& at, std::int64_t raw) noexcept {
+void put_signal(std::span<std::uint8_t> bytes, const BitField& at, std::int64_t raw) noexcept {
     if (raw == kNotAvailable) raw = raw_not_available(at.length);
     put_bits(bytes, at.start_bit, at.length, static_cast<std::uint64_t>(raw));
 }
@@ -119,7 +119,7 @@ DecodeStatus SetDecoder::take_classic(const CanFrame& frame, std::size_t index, 
     const std::uint8_t counter = frame.data[kClassicCounterByte];
     const std::span<const Signal> signals = layout_->signals;
     RawSignals raw{};
-    bool as_partial = true, as_whole = true;  // the same content as what is known
+    bool as_partial = true, as_whole = true;  // the same content as in partial_, as in whole_
     for (std::size_t i = 0; i < signals.size(); ++i) {
         if (signals[i].classic.frame != index) continue;
         raw[i] = get_signal(frame.data, signals[i], signals[i].classic);

@@ -23,7 +23,7 @@ namespace narpa {
 
 /// A field of `length` bits whose least significant bit is bit `start_bit` of the payload (bit b is bit b % 8 of
 /// byte b / 8). `frame` is the index within a classic set; 0 for CAN FD. length 0: not carried.
-struct BitPlace {
+struct BitField {
     std::uint8_t frame = 0;
     std::uint16_t start_bit = 0;
     std::uint8_t length = 0;
@@ -34,7 +34,7 @@ struct Choice {
     std::int64_t raw = 0;
     std::string_view name{};
 };
-/// 0 is the first of the names, 1 the second ...
+/// Choices with the values 0, 1, ... in the order of the names.
 template <std::size_t N>
 [[nodiscard]] constexpr std::array<Choice, N> numbered(const std::array<std::string_view, N>& names) {
     std::array<Choice, N> choices{};
@@ -48,7 +48,7 @@ struct Signal {
     std::string_view name{}, unit{}, comment{};
     double steps_per_unit = 1;  ///< 1 / the factor of the DBC
     bool is_signed = false;
-    BitPlace classic{}, fd{};
+    BitField classic{}, fd{};
     std::span<const Choice> choices{};
 };
 
@@ -71,10 +71,10 @@ struct SetLayout {
     std::uint16_t fd_counter_bit = 0;  ///< where the counter lies in the FD frame; 0: no FD form
 };
 
-/// The signals of all lists. They follow each other on CAN FD: sets their places. One that states no length is as
-/// long as on classic CAN.
+/// Concatenates the lists and places their signals one after the other in the CAN FD frame. A signal without a
+/// length for CAN FD is as long as on classic CAN.
 template <std::size_t... N>
-[[nodiscard]] constexpr auto laid_out(const std::array<Signal, N>&... lists) {
+[[nodiscard]] constexpr auto place_fd_signals(const std::array<Signal, N>&... lists) {
     std::array<Signal, (N + ...)> signals{};
     auto* end = signals.data();
     ((end = std::copy(lists.begin(), lists.end(), end)), ...);
@@ -115,7 +115,7 @@ inline constexpr double kRateSteps_per_rad_s = 5e4;
 inline constexpr std::array<std::string_view, 9> kPoseFrames{
     "Time", "PositionX", "PositionY", "PositionZ", "AttitudeWX", "AttitudeYZ", "MotionX", "MotionY", "MotionZ"};
 
-inline constexpr auto kPoseSignals = laid_out(
+inline constexpr auto kPoseSignals = place_fd_signals(
     pose_signals("Time of validity: simulation clock modulo 2^48 ns", "Body origin in world axes",
                  "Hamilton quaternion, body to world"),
     std::to_array<Signal>({
@@ -137,7 +137,7 @@ inline constexpr double kSigmaRotationSteps_per_rad = 1e7;
 inline constexpr auto kEstimateStateChoices = numbered(kEstimateStates);
 inline constexpr auto kAnswerChoices = numbered(kAnswerKinds);
 
-/// Classic frames 6 to 8: of the position, and of the attitude about the axes that `about` names.
+/// Standard deviations, in classic frames 6 to 8: of the position, and of the attitude, whose axes `about` names.
 [[nodiscard]] constexpr std::array<Signal, 6> sigma_signals(std::string_view about) {
     constexpr std::string_view position = "Standard deviation of the position";
     return {{
@@ -154,16 +154,16 @@ inline constexpr std::array<std::string_view, 10> kEstimateFrames{
     "EstimateTime",       "EstimatePositionX", "EstimatePositionY",  "EstimatePositionZ",  "EstimateAttitudeWX",
     "EstimateAttitudeYZ", "EstimateSigmaXY",   "EstimateSigmaZRotX", "EstimateSigmaRotYZ", "EstimateState"};
 
-inline constexpr auto kEstimateSignals =
-    laid_out(pose_signals("Middle of the exposure: simulation clock modulo 2^48 ns",
-                          "Target's origin in camera axes", "Hamilton quaternion, target to camera"),
-             sigma_signals("Standard deviation of the attitude about the camera's axis"),
-             std::to_array<Signal>({
-                 {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}},
-                 {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}},
-                 {"State", "", "What the estimate rests on", 1, false, {9, 40, 3}, {}, kEstimateStateChoices},
-                 {"Answer", "", "What the frame's own pose is worth", 1, false, {9, 43, 3}, {}, kAnswerChoices},
-             }));
+inline constexpr auto kEstimateSignals = place_fd_signals(
+    pose_signals("Middle of the exposure: simulation clock modulo 2^48 ns", "Target's origin in camera axes",
+                 "Hamilton quaternion, target to camera"),
+    sigma_signals("Standard deviation of the attitude about the camera's axis"),
+    std::to_array<Signal>({
+        {"Frame", "", "Number of the frame that it was estimated from", 1, false, {9, 0, 32}},
+        {"Camera", "", "Index of the camera in the scene", 1, false, {9, 32, 8}},
+        {"State", "", "Source of the estimate", 1, false, {9, 40, 3}, {}, kEstimateStateChoices},
+        {"Answer", "", "Class of the pose estimated from the frame", 1, false, {9, 43, 3}, {}, kAnswerChoices},
+    }));
 
 inline constexpr SetLayout kEstimateLayout{"Estimate",
                                            "Pose of the target that narpa estimates from its own frames",
@@ -175,7 +175,7 @@ inline constexpr std::array<std::string_view, 1> kHeartbeatFrames{"Heartbeat"};
 
 inline constexpr auto kHeartbeatSignals = std::to_array<Signal>({
     {"Time", "us", "Simulation clock modulo 2^40 us", 1, false, {0, 0, 40}},
-    {"State", "", "What the emulator is doing", 1, false, {0, 40, 4}, {}, kRunStates},
+    {"State", "", "State of the emulator", 1, false, {0, 40, 4}, {}, kRunStates},
     {"NoCommand", "", "A commanded body never had a command", 1, false, {0, 44, 1}},
     {"Stale", "", "A commanded body's last command is too old", 1, false, {0, 45, 1}},
     {"DeadlineMissed", "", "A frame was late since the last heartbeat", 1, false, {0, 46, 1}},
@@ -184,7 +184,7 @@ inline constexpr auto kHeartbeatSignals = std::to_array<Signal>({
 
 inline constexpr SetLayout kHeartbeatLayout{"Heartbeat", "narpa is alive", kHeartbeatFrames, kHeartbeatSignals, 0};
 
-// --- What the thrusters are to do -------------------------------------------------------------------------------
+// --- Commands to the thrusters -------------------------------------------------------------------------------
 
 inline constexpr double kImpulseSteps_per_N_s = 1e3;  ///< also of one N m s
 inline constexpr std::string_view kTorqueTimesTime = "Torque about the centre of mass times time, body axes";
@@ -194,8 +194,8 @@ inline constexpr auto kAbortReasonChoices = numbered(kAbortReasons);
 inline constexpr std::array<std::string_view, 5> kActuatorFrames{
     "ActuatorTime", "ActuatorImpulseXY", "ActuatorImpulseZAngX", "ActuatorAngYZ", "ActuatorPhase"};
 
-inline constexpr auto kActuatorSignals = laid_out(std::to_array<Signal>({
-    {"Time", "ns", "Of force: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+inline constexpr auto kActuatorSignals = place_fd_signals(std::to_array<Signal>({
+    {"Time", "ns", "Start of the force: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
     {"ImpulseX", "N s", "Force times time, body axes", kImpulseSteps_per_N_s, true, {1, 0, 24}},
     {"ImpulseY", "N s", "Force times time, body axes", kImpulseSteps_per_N_s, true, {1, 24, 24}},
     {"ImpulseZ", "N s", "Force times time, body axes", kImpulseSteps_per_N_s, true, {2, 0, 24}},
@@ -203,12 +203,12 @@ inline constexpr auto kActuatorSignals = laid_out(std::to_array<Signal>({
     {"AngularImpulseY", "N m s", kTorqueTimesTime, kImpulseSteps_per_N_s, true, {3, 0, 24}},
     {"AngularImpulseZ", "N m s", kTorqueTimesTime, kImpulseSteps_per_N_s, true, {3, 24, 24}},
     {"Leg", "", "Index in the scenario", 1, false, {4, 0, 8}},
-    {"Phase", "", "What the navigation is doing", 1, false, {4, 8, 4}, {}, kGuidancePhaseChoices},
-    {"Abort", "", "Why the navigation has given up", 1, false, {4, 12, 4}, {}, kAbortReasonChoices},
+    {"Phase", "", "Guidance phase of the navigation", 1, false, {4, 8, 4}, {}, kGuidancePhaseChoices},
+    {"Abort", "", "Reason for the navigation's abort", 1, false, {4, 12, 4}, {}, kAbortReasonChoices},
 }));
 
-inline constexpr SetLayout kActuatorLayout{"Actuator", "What the thrusters are to do within one control period",
-                                           kActuatorFrames, kActuatorSignals, 208};
+inline constexpr SetLayout kActuatorLayout{"Actuator", "Commanded impulses of one control period", kActuatorFrames,
+                                           kActuatorSignals, 208};
 
 // --- The navigation's estimate of the target ----------------------------------------------------------------
 
@@ -218,28 +218,28 @@ inline constexpr std::array<std::string_view, 10> kNavigationFrames{
     "NavigationSigmaRotYZ", "NavigationCycle"};
 
 inline constexpr auto kNavigationSignals =
-    laid_out(pose_signals("Of validity: simulation clock modulo 2^48 ns", "Target's origin in the chaser's axes",
-                          "Hamilton quaternion, target to chaser"),
-             sigma_signals("Standard deviation of the attitude about the chaser's axis"),
-             std::to_array<Signal>({
-                 {"Cycle", "", "Number of the control period", 1, false, {9, 0, 32}},
-                 {"Frames", "", "Camera frames taken since the estimate before", 1, false, {9, 32, 8}},
-                 {"Sweeps", "", "LiDAR sweeps taken since the estimate before", 1, false, {9, 40, 8}},
-             }));
+    place_fd_signals(pose_signals("Time of validity: simulation clock modulo 2^48 ns",
+                                  "Target's origin in the chaser's axes", "Hamilton quaternion, target to chaser"),
+                     sigma_signals("Standard deviation of the attitude about the chaser's axis"),
+                     std::to_array<Signal>({
+                         {"Cycle", "", "Number of the control period", 1, false, {9, 0, 32}},
+                         {"Frames", "", "Camera frames used since the previous estimate", 1, false, {9, 32, 8}},
+                         {"Sweeps", "", "LiDAR sweeps used since the previous estimate", 1, false, {9, 40, 8}},
+                     }));
 
 inline constexpr SetLayout kNavigationLayout{"Navigation",
-                                             "The target beside the chaser as the navigation believes it",
+                                             "Target relative to the chaser, estimated by the navigation",
                                              kNavigationFrames, kNavigationSignals, 480};
 
-// --- What star tracker and gyroscope measure --------------------------------------------------------------------
+// --- Star tracker and gyroscope --------------------------------------------------------------------
 
 inline constexpr double kGyroscopeSteps_per_rad_s = 1e6;
 
 inline constexpr std::array<std::string_view, 5> kAttitudeFrames{"AttitudeTime", "AttitudeWX", "AttitudeYZ",
                                                                  "AttitudeRateXY", "AttitudeRateZ"};
 
-inline constexpr auto kAttitudeSignals = laid_out(std::to_array<Signal>({
-    {"Time", "ns", "Of the measurement: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
+inline constexpr auto kAttitudeSignals = place_fd_signals(std::to_array<Signal>({
+    {"Time", "ns", "Time of the measurement: simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
     {"AttitudeW", "", "Hamilton quaternion, chaser to world", kAttitudeSteps, true, {1, 0, 24}},
     {"AttitudeX", "", "Hamilton quaternion, chaser to world", kAttitudeSteps, true, {1, 24, 24}},
     {"AttitudeY", "", "Hamilton quaternion, chaser to world", kAttitudeSteps, true, {2, 0, 24}},
@@ -249,23 +249,24 @@ inline constexpr auto kAttitudeSignals = laid_out(std::to_array<Signal>({
     {"RateZ", "rad/s", "Angular rate in body axes", kGyroscopeSteps_per_rad_s, true, {4, 0, 24}},
 }));
 
-inline constexpr SetLayout kAttitudeLayout{"Attitude", "What the chaser's star tracker and gyroscope measure",
+inline constexpr SetLayout kAttitudeLayout{"Attitude", "Measurements of the chaser's star tracker and gyroscope",
                                            kAttitudeFrames, kAttitudeSignals, 216};
 
-// --- What the dynamics are doing --------------------------------------------------------------------------------
+// --- State of the dynamics --------------------------------------------------------------------------------
 
 inline constexpr auto kDynamicsPhaseChoices = numbered(kDynamicsPhases);
 
 inline constexpr std::array<std::string_view, 3> kDynamicsFrames{"DynamicsTime", "DynamicsStart", "DynamicsPhase"};
 
-inline constexpr auto kDynamicsSignals = laid_out(std::to_array<Signal>({
+inline constexpr auto kDynamicsSignals = place_fd_signals(std::to_array<Signal>({
     {"Time", "ns", "Simulation clock modulo 2^48 ns", 1, false, {0, 0, 48}},
     {"Start", "ns", "The scenario's time 0: simulation clock modulo 2^48 ns", 1, false, {1, 0, 48}},
-    {"Phase", "", "What the dynamics are doing", 1, false, {2, 0, 4}, {}, kDynamicsPhaseChoices},
+    {"Phase", "", "State of the dynamics", 1, false, {2, 0, 4}, {}, kDynamicsPhaseChoices},
 }));
 
-inline constexpr SetLayout kDynamicsLayout{"Dynamics", "Before the pose commands of the same time", kDynamicsFrames,
-                                           kDynamicsSignals, 104};
+inline constexpr SetLayout kDynamicsLayout{"Dynamics",
+                                           "State of the dynamics: sent before the pose commands of the same time",
+                                           kDynamicsFrames, kDynamicsSignals, 104};
 
 // --- Cameras that are operated while they run -------------------------------------------------------------------
 
@@ -274,38 +275,38 @@ inline constexpr auto kOffOnChoices = std::to_array<Choice>({{0, "off"}, {1, "on
 inline constexpr auto kTriggerModeChoices = numbered(kTriggerModes);
 inline constexpr auto kCameraAnswerChoices = numbered(kCameraAnswers);
 
-/// Classic frames from `first` on: what a camera is set to. A signal of a command may be "not available".
+/// The settings of a camera, in classic frames from `first` on. In a command, signals may be "not available".
 [[nodiscard]] constexpr std::array<Signal, 11> camera_setting_signals(std::uint8_t first) {
     const auto at = [&](int frame) { return static_cast<std::uint8_t>(first + frame); };
     return {{
-        {"Running", "", "Frames are exposed", 1, true, {at(0), 0, 8}, {}, kOffOnChoices},
-        {"Trigger", "", "What starts an exposure", 1, true, {at(0), 8, 8}, {}, kTriggerModeChoices},
-        {"AutoExposure", "", "The camera sets its exposure time", 1, true, {at(0), 16, 8}, {}, kOffOnChoices},
+        {"Running", "", "Whether frames are exposed", 1, true, {at(0), 0, 8}, {}, kOffOnChoices},
+        {"Trigger", "", "Source of the exposure's start", 1, true, {at(0), 8, 8}, {}, kTriggerModeChoices},
+        {"AutoExposure", "", "Automatic exposure time", 1, true, {at(0), 16, 8}, {}, kOffOnChoices},
         {"Binning", "", "n: blocks of n x n pixels have their mean", 1, true, {at(0), 24, 8}},
-        {"Gain", "dB", "Over the gain of the scene's detector", kGainSteps_per_dB, true, {at(0), 32, 16}},
+        {"Gain", "dB", "Factor on the gain of the scene's detector", kGainSteps_per_dB, true, {at(0), 32, 16}},
         {"Exposure", "ns", "Exposure time of one row", 1, true, {at(1), 0, 48}},
         {"RegionX", "px", "First column that is read out", 1, true, {at(2), 0, 24}},
         {"RegionY", "px", "First row that is read out", 1, true, {at(2), 24, 24}},
         {"RegionWidth", "px", "Columns that are read out", 1, true, {at(3), 0, 24}},
         {"RegionHeight", "px", "Rows that are read out", 1, true, {at(3), 24, 24}},
-        {"Period", "ns", "From frame to frame, and the least between triggers", 1, true, {at(4), 0, 48}},
+        {"Period", "ns", "Time between frames; minimum time between triggers", 1, true, {at(4), 0, 48}},
     }};
 }
 
 inline constexpr std::array<std::string_view, 6> kCameraCommandFrames{
     "CameraCommandCamera",   "CameraCommandSwitches", "CameraCommandExposure",
     "CameraCommandRegionXY", "CameraCommandRegionWH", "CameraCommandPeriod"};
-inline constexpr auto kCameraCommandSignals =
-    laid_out(std::to_array<Signal>({{"Camera", "", "Index of the camera in the scene", 1, false, {0, 0, 8}}}),
-             camera_setting_signals(1));
+inline constexpr auto kCameraCommandSignals = place_fd_signals(
+    std::to_array<Signal>({{"Camera", "", "Index of the camera in the scene", 1, false, {0, 0, 8}}}),
+    camera_setting_signals(1));
 inline constexpr SetLayout kCameraCommandLayout{"CameraCommand",
-                                                "Changes a camera's settings; not available: as it is",
+                                                "Changes a camera's settings; not available: unchanged",
                                                 kCameraCommandFrames, kCameraCommandSignals, 248};
 
 inline constexpr std::array<std::string_view, 2> kCameraTriggerFrames{"CameraTriggerCameras", "CameraTriggerTime"};
-inline constexpr auto kCameraTriggerSignals = laid_out(std::to_array<Signal>({
+inline constexpr auto kCameraTriggerSignals = place_fd_signals(std::to_array<Signal>({
     {"Cameras", "", "Bit i: camera i of the scene", 1, false, {0, 0, 16}},
-    {"AtOnce", "", "As soon as the cameras can, instead of at Time", 1, false, {0, 16, 8}, {}, kOffOnChoices},
+    {"AtOnce", "", "As soon as possible, instead of at Time", 1, false, {0, 16, 8}, {}, kOffOnChoices},
     {"Time", "ns", "Start of the exposure: simulation clock modulo 2^48 ns", 1, false, {1, 0, 48}},
 }));
 inline constexpr SetLayout kCameraTriggerLayout{"CameraTrigger",
@@ -313,45 +314,45 @@ inline constexpr SetLayout kCameraTriggerLayout{"CameraTrigger",
                                                 kCameraTriggerFrames, kCameraTriggerSignals, 72};
 
 inline constexpr std::array<std::string_view, 2> kCameraReplyFrames{"CameraReplyAnswer", "CameraReplyTime"};
-inline constexpr auto kCameraReplySignals = laid_out(std::to_array<Signal>({
+inline constexpr auto kCameraReplySignals = place_fd_signals(std::to_array<Signal>({
     {"Camera", "", "Index of the camera in the scene", 1, false, {0, 0, 8}},
-    {"ToTrigger", "", "Answers a trigger, not a command", 1, false, {0, 8, 8}, {}, kOffOnChoices},
-    {"Answer", "", "Accepted, or why not", 1, false, {0, 16, 8}, {}, kCameraAnswerChoices},
+    {"ToTrigger", "", "The reply is to a trigger, not to a command", 1, false, {0, 8, 8}, {}, kOffOnChoices},
+    {"Answer", "", "Accepted, or the reason for refusal", 1, false, {0, 16, 8}, {}, kCameraAnswerChoices},
     {"Time",
      "ns",
-     "From which the settings act, or start of the exposure: simulation clock modulo 2^48 ns",
+     "First time of the settings, or start of the exposure: simulation clock modulo 2^48 ns",
      1,
      false,
      {1, 0, 48}},
 }));
-inline constexpr SetLayout kCameraReplyLayout{"CameraReply", "Counter: of the command or trigger that it answers",
+inline constexpr SetLayout kCameraReplyLayout{"CameraReply", "Counter: that of the command or trigger",
                                               kCameraReplyFrames, kCameraReplySignals, 72};
 
 inline constexpr std::array<std::string_view, 6> kCameraStateFrames{"CameraStateFrame",    "CameraStateSwitches",
                                                                     "CameraStateExposure", "CameraStateRegionXY",
                                                                     "CameraStateRegionWH", "CameraStatePeriod"};
 inline constexpr auto kCameraStateSignals =
-    laid_out(std::to_array<Signal>({
-                 {"Frame", "", "Frame number", 1, false, {0, 0, 32}},
-                 {"Camera", "", "Index of the camera in the scene", 1, false, {0, 32, 8}},
-                 {"CommandCounter", "", "Of the newest command in effect", 1, false, {0, 40, 8}},
-             }),
-             camera_setting_signals(1));
-inline constexpr SetLayout kCameraStateLayout{"CameraState", "What a frame was taken with", kCameraStateFrames,
-                                              kCameraStateSignals, 288};
+    place_fd_signals(std::to_array<Signal>({
+                         {"Frame", "", "Frame number", 1, false, {0, 0, 32}},
+                         {"Camera", "", "Index of the camera in the scene", 1, false, {0, 32, 8}},
+                         {"CommandCounter", "", "Counter of the newest command in effect", 1, false, {0, 40, 8}},
+                     }),
+                     camera_setting_signals(1));
+inline constexpr SetLayout kCameraStateLayout{"CameraState", "Settings with which a frame was taken",
+                                              kCameraStateFrames, kCameraStateSignals, 288};
 
 // --- LiDARs whose shots go over CAN: velocimeters, altimeters ---------------------------------------------------
 
 inline constexpr std::array<std::string_view, 4> kLidarBeamFrames{"LidarBeamNumber", "LidarBeamTime",
                                                                   "LidarBeamRange", "LidarBeamVelocity"};
-inline constexpr auto kLidarBeamSignals = laid_out(std::to_array<Signal>({
+inline constexpr auto kLidarBeamSignals = place_fd_signals(std::to_array<Signal>({
     {"Lidar", "", "Index of the LiDAR in the scene", 1, false, {0, 0, 8}},
     {"Beam", "", "Number of the beam", 1, false, {0, 8, 16}},
-    {"Time", "ns", "Of the shot: simulation clock modulo 2^48 ns", 1, false, {1, 0, 48}},
-    {"Range", "m", "Along the beam; not available: no echo", 1e6, true, {2, 0, 48}},
-    {"Velocity", "m/s", "Along the beam, receding is positive; not available: none", 1e6, true, {3, 0, 48}},
+    {"Time", "ns", "Time of the shot: simulation clock modulo 2^48 ns", 1, false, {1, 0, 48}},
+    {"Range", "m", "Range along the beam; not available: no echo", 1e6, true, {2, 0, 48}},
+    {"Velocity", "m/s", "Radial velocity, receding is positive; not available: none", 1e6, true, {3, 0, 48}},
 }));
-inline constexpr SetLayout kLidarBeamLayout{"LidarBeam", "What one shot of a LiDAR measured", kLidarBeamFrames,
+inline constexpr SetLayout kLidarBeamLayout{"LidarBeam", "Measurement of one shot of a LiDAR", kLidarBeamFrames,
                                             kLidarBeamSignals, 168};
 
 }  // namespace narpa

@@ -20,7 +20,7 @@ inline constexpr std::size_t kUdpMulticastMaxBytes = 256;
 [[nodiscard]] std::size_t encode_udp_multicast(const CanFrame& frame,
                                                std::span<std::uint8_t, kUdpMulticastMaxBytes> out) noexcept;
 
-/// False when the datagram is not such a map or holds no valid frame; `out` is then as it was. A missing
+/// False when the datagram is not such a map or holds no valid frame; `out` is then unchanged. A missing
 /// `is_extended_id` means true, as in python-can.
 [[nodiscard]] bool decode_udp_multicast(std::span<const std::uint8_t> datagram, CanFrame& out) noexcept;
 

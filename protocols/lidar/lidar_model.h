@@ -37,8 +37,8 @@ struct LidarShot {
 /// One echo of a shot as the receiver measures it, before a packet rounds it.
 struct LidarEcho {
     double range_m = 0;  ///< 0, negative or NaN: no echo
-    /// Of a diffuse surface across the beam that would send as much light back from there; 1 = 100 %.
-    /// Retroreflectors are above 1.
+    /// Reflectance of a diffuse surface perpendicular to the beam that would return as much light from there; 1 is
+    /// 100 %. Retroreflectors are above 1.
     float reflectivity = 0;
     double velocity_m_s = 0;  ///< of the surface along the beam, receding is positive; 0 where it is not measured
 };
@@ -46,18 +46,19 @@ struct LidarEcho {
 enum class LidarReturns : std::uint8_t {
     strongest,
     last,  ///< the farthest
-    dual,  ///< both; where they are the same, the second strongest beside it
+    dual,  ///< both; if they are the same echo, the second strongest too
     strongest_two,
 };
 
-/// What comes back of one shot. Where there is one echo, it is `strongest` and `last`, and `second` is none.
+/// The echoes of one shot. A single echo is both `strongest` and `last`, and `second` is empty.
 struct LidarEchoes {
     LidarEcho strongest, second, last;
-    /// Of the surface that the axis meets and the air before it, of a white one that faces the Sun; 0 where no one
-    /// asks for it.
+    /// Sunlight from the surface that the axis meets and from the air before it, relative to a white surface that
+    /// faces the Sun; 0 where it is not requested.
     float sunlight = 0;
 
-    /// What a unit reports, in its packets' order; the second is none where there is one echo, or one is wanted.
+    /// The echoes that a unit reports, in the order of its packets. The second is empty with a single echo, or in a
+    /// mode of one return.
     [[nodiscard]] std::array<LidarEcho, 2> reported(LidarReturns returns) const noexcept {
         if (returns == LidarReturns::strongest) return {strongest, LidarEcho{}};
         if (returns == LidarReturns::last) return {last, LidarEcho{}};
@@ -85,8 +86,8 @@ struct LidarAxis {
     std::int64_t t_offset_ns = 0;  ///< after the packet's start
 };
 
-/// What each pulse lights, evenly by solid angle, where that is more than the beam of one shot: a flash LiDAR's
-/// whole field, about its y axis, in its own frame.
+/// The field that each pulse lights, evenly by solid angle, where it is larger than the beam of one shot: the whole
+/// field of view of a flash LiDAR. About the y axis of the LiDAR's frame.
 struct LidarField {
     enum class Kind : std::uint8_t {
         beam,    ///< no more than each shot's own beam
@@ -94,21 +95,21 @@ struct LidarField {
         angles,  ///< a span of azimuths and one of elevations
     };
     Kind kind = Kind::beam;
-    double horizontal = 0, vertical = 0;  ///< half of it: tangents, or radians
+    double horizontal = 0, vertical = 0;  ///< half extents: tangents of a plane, or radians
 
     /// `direction`: unit.
     [[nodiscard]] bool contains(const Vec3& direction) const noexcept;
     friend bool operator==(const LidarField&, const LidarField&) = default;
 };
 
-/// How the instrument appears on the network by default.
+/// Default addresses and ports of the instrument on the network.
 struct LidarNetwork {
     std::uint16_t data_port = 0, position_port = 0;
     std::array<std::uint8_t, 6> mac{};
     std::array<std::uint8_t, 4> address{};
     std::size_t datagram_bytes_max = 1472;  ///< of UDP payload; more than 1472 travel in several Ethernet frames
 
-    /// Position packets keep this distance from the data port wherever that is moved to; 0: there are none.
+    /// Offset of the position port, kept when the data port is changed; 0: no position packets.
     [[nodiscard]] constexpr int position_port_offset() const noexcept {
         return position_port == 0 ? 0 : position_port - data_port;
     }
@@ -117,7 +118,7 @@ struct LidarNetwork {
 /// State of the pulse per second that a unit takes its time from.
 enum class LidarPps : std::uint8_t { absent, synchronising, locked, error };
 
-/// A unit's own correction of one beam, as its calibration file has it.
+/// Calibration of one beam of a unit, as in its calibration file.
 struct LidarBeam {
     double elevation_rad = 0;
     double azimuth_rad = 0;     ///< added to the rotor's; clockwise
@@ -125,7 +126,7 @@ struct LidarBeam {
     double height_m = 0;        ///< of the beam's origin above the sensor's
 };
 
-/// How a unit is set. Members that its make does not have are ignored.
+/// Settings of a unit. Members that its make does not have are ignored.
 struct LidarSettings {
     double rate_hz = 0;  ///< turns or frames a second, within the make's limits
     LidarReturns returns = LidarReturns::strongest;
@@ -136,7 +137,7 @@ struct LidarSettings {
     std::string calibration{};       ///< text of the unit's file in the maker's own format; empty: as designed
 };
 
-/// Of one configured unit.
+/// Properties of one configured unit.
 struct LidarSpec {
     std::string_view name;  ///< of the make
     double rate_hz = 0;
@@ -152,7 +153,7 @@ struct LidarSpec {
     double range_resolution_m = 0;          ///< ranges in packets are multiples of it
     std::int64_t time_resolution_ns = 1;    ///< of a packet's time stamp, which is rounded down
     bool measures_velocity = false;
-    double velocity_resolution_m_s = 0;  ///< of those in packets
+    double velocity_resolution_m_s = 0;  ///< of velocities in packets
     bool measures_sunlight = false;
     LidarField lit{};
     LidarNetwork network{};
@@ -202,15 +203,14 @@ public:
         return 0;
     }
 
-    /// What the unit states of itself beside its packets, as a file of the maker's: JSON. Empty: nothing. May
-    /// allocate.
+    /// Metadata of the unit, as a JSON file of the maker; empty: none. May allocate.
     [[nodiscard]] virtual std::string metadata() const { return {}; }
 
 private:
     LidarSpec spec_;
 };
 
-/// An instrument as its maker sells it.
+/// A product of a maker of LiDARs.
 struct LidarMake {
     std::string_view name;  ///< `model` of a scene's [[lidar]]
     double rate_hz_min = 0, rate_hz_max = 0, rate_hz_default = 0;
@@ -221,13 +221,14 @@ struct LidarMake {
         profiles{};                  ///< formats of packets to choose from, which decide on the returns
     std::span<const int> columns{};  ///< of a turn, to choose from
     LidarNetwork network{};
-    /// Takes what `settings` leaves open (0, empty) from its calibration text or the make's defaults. Errors: the
-    /// text, with a line; a combination that the make does not have, without. Null: nothing is left open.
+    /// Fills in members of `settings` that are not set (0, empty), from the calibration text or the make's
+    /// defaults. Errors: a bad calibration text, with a line; a combination that the make does not have, without.
+    /// Null: nothing to fill in.
     std::function<Status(LidarSettings& settings)> complete{};
     /// `settings` are within the limits above.
     std::function<std::shared_ptr<const LidarModel>(const LidarSettings& settings)> configure;
 
-    /// Set as delivered.
+    /// A unit with the default settings.
     [[nodiscard]] std::shared_ptr<const LidarModel> configure_default() const {
         return configure({.rate_hz = rate_hz_default});
     }
@@ -237,7 +238,7 @@ struct LidarMake {
 [[nodiscard]] std::span<const LidarMake* const> lidar_makes() noexcept;
 /// The make of this name; null where there is none.
 [[nodiscard]] const LidarMake* find_lidar_make(std::string_view name) noexcept;
-/// Adds a make that outlives the program's use of it. Before any scene is read and any thread is started.
+/// Adds a make, which must stay alive. To be called before any scene is read and any thread is started.
 void add_lidar_make(const LidarMake& make);
 
 }  // namespace narpa

@@ -17,11 +17,11 @@ constexpr int kPacketColumns = OusterFormat::kColumns;
 constexpr std::array<int, 3> kColumnsOfATurn{512, 1024, 2048};
 constexpr int kDesignBeams = 128;
 
-/// Of a white diffuse surface across the beam at 1 m. A recorded OS0-32 has 23,000 to 27,000 (75th to 99th
-/// percentile of signal * range^2 / reflectivity).
+/// Signal photons of a white diffuse surface perpendicular to the beam at 1 m. A recorded OS0-32 has 23,000 to
+/// 27,000 (75th to 99th percentile of signal * range^2 / reflectivity).
 constexpr double kSignalPhotons_m2 = 25'000;
-/// Of a white surface that faces the Sun at 1 au. The maker gives no scale; this one just fits the low-bandwidth
-/// profile.
+/// Near-infrared value of a white surface that faces the Sun at 1 au. The maker gives no scale; this one just fits
+/// the low-bandwidth profile.
 constexpr double kNearIrOfSunlitWhite = 4000;
 
 constexpr LidarNetwork kOusterNetwork{.data_port = 7502,
@@ -39,7 +39,8 @@ void set_design_beams(OusterMetadata& unit, int beams) {
     }
 }
 
-/// Columns by which a reader shifts each beam so that a column of its image is one azimuth; the least is 0.
+/// Columns by which a reader shifts (destaggers) each beam, so that a column of its image has one azimuth; the
+/// smallest is 0.
 std::vector<int> pixel_shifts(const OusterMetadata& unit) {
     std::vector<int> shifts;
     for (const double a : unit.azimuth_deg) shifts.push_back(static_cast<int>(std::lround(a / 360 * unit.columns)));
@@ -48,7 +49,7 @@ std::vector<int> pixel_shifts(const OusterMetadata& unit) {
     return shifts;
 }
 
-/// What the text states; without one, as designed.
+/// The unit of the calibration text; without a text, as designed.
 Result<OusterMetadata> read_unit(const LidarSettings& settings, int beams) {
     OusterMetadata unit;
     if (settings.calibration.empty()) {
@@ -66,7 +67,7 @@ Result<OusterMetadata> read_unit(const LidarSettings& settings, int beams) {
     return unit;
 }
 
-/// The unit in the mode of the settings, of the text or as delivered, in this order.
+/// The unit with the mode of the settings, else of the text, else as delivered.
 Result<OusterMetadata> configured_unit(const LidarSettings& settings, int beams) {
     auto read = read_unit(settings, beams);
     if (!read) return read;
@@ -239,7 +240,7 @@ private:
     }
     [[nodiscard]] double origin_to_beam_m() const noexcept { return 1e-3 * unit_.origin_to_beam_mm(); }
 
-    /// In our frame: a point or, without the translation, a direction in the maker's lidar frame.
+    /// Transforms a point (`translation` 1) or a direction (0) from the maker's lidar frame to ours.
     [[nodiscard]] Vec3 from_lidar(const Vec3& p, double translation) const noexcept {
         const OusterTransform& m = unit_.lidar_to_sensor;
         const auto row = [&](std::size_t i) {
@@ -285,7 +286,7 @@ private:
                 .near_ir = to_photons(kNearIrOfSunlitWhite * static_cast<double>(echoes.sunlight))};
     }
 
-    /// Of this unit, with columns in order and times that a turn has.
+    /// True for packets of this unit whose columns are in order, with times within one turn.
     [[nodiscard]] bool is_ours(std::span<const std::uint8_t> bytes) const noexcept {
         if (bytes.size() != format_.bytes()) return false;
         if (format_.profile() != OusterProfile::legacy) {

@@ -10,14 +10,14 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kMost_mm = 1000;
-constexpr int kMostColumns = 4096, kMostHz = 100;
+constexpr double kMax_mm = 1000;
+constexpr int kMaxColumns = 4096, kMaxHz = 100;
 
 int line_at(std::string_view text, std::size_t offset) {
     return 1 + static_cast<int>(std::count(text.begin(), text.begin() + std::min(offset, text.size()), '\n'));
 }
 
-/// What is wrong with a file, by key.
+/// An error in a file: its key, and what was expected.
 struct MetadataFault {
     std::string_view key;
     std::string expected;
@@ -49,7 +49,7 @@ public:
         if (const json* node = find(key)) out = static_cast<Integer>(integer_of(key, *node, low, high));
     }
 
-    /// Of any length.
+    /// Reads a list of any length.
     void numbers(std::string_view key, double most, std::vector<double>& out) const {
         const json* node = find(key);
         if (!node) return;
@@ -73,7 +73,7 @@ public:
 private:
     [[nodiscard]] static std::int64_t integer_of(std::string_view key, const json& x, std::int64_t low,
                                                  std::int64_t high) {
-        // Compared as a double first: a whole number beyond 64 bits is one.
+        // Compared as a double first: conversion to 64 bits would wrap larger numbers.
         if (!x.is_number_integer() || !(x.get<double>() >= static_cast<double>(low)) ||
             !(x.get<double>() <= static_cast<double>(high)))
             throw MetadataFault{key, "whole numbers from " + std::to_string(low) + " to " + std::to_string(high)};
@@ -86,7 +86,7 @@ private:
 /// A rotation and a translation.
 void read_transform(const MetadataReader& file, std::string_view key, OusterTransform& out) {
     std::vector<double> m;
-    file.numbers(key, kMost_mm, m);
+    file.numbers(key, kMax_mm, m);
     if (m.empty()) return;
     constexpr double kTolerance = 1e-3;
     const auto is_near = [](double a, double b) { return std::abs(a - b) <= kTolerance; };
@@ -110,8 +110,8 @@ void read_mode(const MetadataReader& file, OusterMetadata& out) {
     const char* times = columns.ptr;
     const bool has_times = columns.ec == std::errc{} && times != end && *times == 'x';
     const auto rate = std::from_chars(has_times ? times + 1 : end, end, out.rate_hz);
-    if (rate.ec != std::errc{} || rate.ptr != end || out.columns < 1 || out.columns > kMostColumns ||
-        out.rate_hz < 1 || out.rate_hz > kMostHz)
+    if (rate.ec != std::errc{} || rate.ptr != end || out.columns < 1 || out.columns > kMaxColumns ||
+        out.rate_hz < 1 || out.rate_hz > kMaxHz)
         throw MetadataFault{"lidar_mode", "columns and turns a second, as 1024x10"};
 }
 
@@ -124,25 +124,25 @@ void read_beams(const MetadataReader& file, OusterMetadata& out) {
     read_transform(file, "beam_to_lidar_transform", out.beam_to_lidar);
     // Older files state the distance alone.
     if (const json* n = file.find("lidar_origin_to_beam_origin_mm"); n && !file.find("beam_to_lidar_transform"))
-        out.beam_to_lidar[3] = MetadataReader::number_of("lidar_origin_to_beam_origin_mm", *n, kMost_mm);
+        out.beam_to_lidar[3] = MetadataReader::number_of("lidar_origin_to_beam_origin_mm", *n, kMax_mm);
 }
 
 void read_format(const MetadataReader& file, OusterMetadata& out) {
     read_mode(file, out);
-    file.integer("columns_per_frame", 1, kMostColumns, out.columns);
+    file.integer("columns_per_frame", 1, kMaxColumns, out.columns);
     file.text("udp_profile_lidar", out.profile);
     if (!out.profile.empty() && std::ranges::find(kOusterProfiles, out.profile) == kOusterProfiles.end())
         throw MetadataFault{"udp_profile_lidar",
                             std::string(kOusterProfiles[0]) + ", " + std::string(kOusterProfiles[1]) + ", " +
                                 std::string(kOusterProfiles[2]) + " or " + std::string(kOusterProfiles[3])};
     std::vector<int> window;
-    file.integers("column_window", 0, kMostColumns - 1, window);
+    file.integers("column_window", 0, kMaxColumns - 1, window);
     if (!window.empty()) {
         if (window.size() != 2 || window[0] > window[1] || window[1] >= out.columns)
             throw MetadataFault{"column_window", "the first and the last column, in order and of those in a turn"};
         out.column_window = {window[0], window[1]};
     }
-    file.integers("pixel_shift_by_row", -kMostColumns, kMostColumns, out.pixel_shift_by_row);
+    file.integers("pixel_shift_by_row", -kMaxColumns, kMaxColumns, out.pixel_shift_by_row);
     if (!out.pixel_shift_by_row.empty() && out.pixel_shift_by_row.size() != out.altitude_deg.size())
         throw MetadataFault{"pixel_shift_by_row", "a number for each beam"};
     file.integer("udp_port_lidar", 1, 65535, out.port_lidar);
@@ -157,8 +157,8 @@ void read_identity(const MetadataReader& file, OusterMetadata& out) {
     file.text("build_rev", out.build_rev);
     file.text("build_date", out.build_date);
     file.integer("initialization_id", 0, 0xFF'FFFF, out.init_id);
-    constexpr std::size_t kMostDigits = 12;  // packets have 40 bits for it
-    if (out.prod_sn.size() > kMostDigits ||
+    constexpr std::size_t kMaxDigits = 12;  // packets have 40 bits for it
+    if (out.prod_sn.size() > kMaxDigits ||
         !std::ranges::all_of(out.prod_sn, [](char c) { return c >= '0' && c <= '9'; }))
         throw MetadataFault{"prod_sn", "at most 12 digits"};
 }

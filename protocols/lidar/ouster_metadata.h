@@ -1,4 +1,4 @@
-/// protocols/lidar/ouster_metadata.h - what an Ouster sensor states of itself: the maker's metadata JSON.
+/// protocols/lidar/ouster_metadata.h - the metadata of an Ouster sensor, in the maker's JSON format.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ struct OusterMetadata {
     std::vector<int> pixel_shift_by_row{};    ///< for `columns`; empty: not stated
     std::uint16_t port_lidar = 7502, port_imu = 7503;
 
-    /// Along a beam from the lidar's axis to where its range counts from; the maker's n.
+    /// Distance along a beam from the lidar's axis to the origin of its ranges; the maker's n.
     [[nodiscard]] double origin_to_beam_mm() const noexcept;
     [[nodiscard]] std::uint64_t serial() const noexcept;
 };

@@ -7,8 +7,8 @@
 namespace narpa {
 namespace {
 
-/// Bits of a pixel, counted from the least significant of its first byte; none crosses from one 8 bytes to the
-/// next. `shift`: the packet states value >> shift.
+/// Bits of a pixel, counted from the least significant of its first byte; no field crosses a boundary of 8 bytes.
+/// `shift`: the packet states value >> shift.
 struct Field {
     unsigned first = 0, bits = 0, shift = 0;
 

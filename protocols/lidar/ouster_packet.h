@@ -15,17 +15,17 @@ namespace narpa {
 
 enum class OusterProfile : std::uint8_t { legacy, single, dual, low_bandwidth };
 
-/// As the maker names them in `udp_profile_lidar`, in the order of OusterProfile.
+/// The maker's names in `udp_profile_lidar`, in the order of OusterProfile.
 inline constexpr std::array<std::string_view, 4> kOusterProfiles{"LEGACY", "RNG19_RFL8_SIG16_NIR16",
                                                                  "RNG19_RFL8_SIG16_NIR16_DUAL", "RNG15_RFL8_NIR8"};
 
-/// Of all profiles but LEGACY.
+/// Packet header of all profiles but LEGACY.
 struct OusterHeader {
     static constexpr std::uint16_t kLidar = 1;
 
     std::uint16_t packet_type = kLidar;
     std::uint16_t frame_id = 0;         ///< counts turns
-    std::uint32_t init_id = 0;          ///< 24 bits; changes whenever the sensor starts anew
+    std::uint32_t init_id = 0;          ///< 24 bits; changes at each restart of the sensor
     std::uint64_t serial = 0;           ///< 40 bits
     std::array<std::uint8_t, 20> rest;  ///< countdowns and status of shot limiting and thermal shutdown, then 0
     std::array<std::uint8_t, 32> footer;
@@ -51,10 +51,10 @@ struct OusterReturn {
 struct OusterPixel {
     std::array<OusterReturn, 2> returns{};  ///< the second one in the dual profile alone
     std::uint16_t near_ir = 0;              ///< photons of ambient light
-    std::array<std::uint64_t, 2> unused{};  ///< all bits of no field, as they are in the packet
+    std::array<std::uint64_t, 2> unused{};  ///< bits outside of all fields, kept as in the packet
 };
 
-/// Packets of one profile from a sensor with so many beams.
+/// Reads and writes packets of one profile from a sensor with this number of beams.
 class OusterFormat {
 public:
     static constexpr int kColumns = 16;

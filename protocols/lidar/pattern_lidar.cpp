@@ -19,7 +19,7 @@ Vec3 direction(double azimuth_rad, double elevation_rad) noexcept {
 
 /// The most shots that a packet holds and that divide the frame's.
 std::size_t shots_per_packet(std::size_t shots, bool dual) noexcept {
-    std::size_t n = std::min(shots, PointPacket::kMostRecords / (dual ? 2 : 1));
+    std::size_t n = std::min(shots, PointPacket::kMaxRecords / (dual ? 2 : 1));
     while (shots % n != 0) --n;
     return n;
 }
@@ -135,7 +135,7 @@ public:
 
 private:
     static std::int64_t frame_ns(const LidarSettings& settings) { return std::llround(1e9 / settings.rate_hz); }
-    /// Where the frame's packet `place` starts.
+    /// Start of packet `place` after the start of its frame.
     static std::int64_t into_frame_ns(std::int64_t place, std::int64_t packets, std::int64_t frame_ns) noexcept {
         return place * frame_ns / packets;
     }
@@ -201,7 +201,7 @@ private:
         return r;
     }
 
-    /// Of this instrument, in this return mode.
+    /// The packet if it is of this instrument in this return mode.
     [[nodiscard]] std::optional<PointPacket> read(std::span<const std::uint8_t> bytes) const noexcept {
         auto p = PointPacket::read(bytes);
         if (p && (bytes.size() != spec().data_packet_bytes || p->dual != dual_ ||
@@ -231,8 +231,8 @@ bool whole_micro(double x) {
 }
 
 Status check_shots(const std::vector<PatternShot>& shots) {
-    if (shots.empty() || shots.size() > LidarPattern::kMostShots)
-        return fault(shots.size(), " shots a frame, expected 1 to ", LidarPattern::kMostShots);
+    if (shots.empty() || shots.size() > LidarPattern::kMaxShots)
+        return fault(shots.size(), " shots a frame, expected 1 to ", LidarPattern::kMaxShots);
     for (std::size_t i = 0; i < shots.size(); ++i) {
         const PatternShot& s = shots[i];
         const auto wrong = [&](const char* what) { return fault("shot ", i, ": ", what); };
@@ -258,9 +258,9 @@ Status check(const LidarPattern& p) {
         return fault("a frame at ", p.rate_hz_min, " Hz and the latency of ", p.latency_s, " s: expected at most ",
                      LidarPattern::kLongest_s, " s together");
     const auto packets = static_cast<double>(p.shots.size() / shots_per_packet(p.shots.size(), p.dual));
-    constexpr double kMostPackets_hz = 1e5;
-    if (!(packets * p.rate_hz_max <= kMostPackets_hz))
-        return fault(packets, " packets a frame at ", p.rate_hz_max, " Hz, expected at most ", kMostPackets_hz,
+    constexpr double kMaxPackets_hz = 1e5;
+    if (!(packets * p.rate_hz_max <= kMaxPackets_hz))
+        return fault(packets, " packets a frame at ", p.rate_hz_max, " Hz, expected at most ", kMaxPackets_hz,
                      " a second",
                      packets * 8 > static_cast<double>(p.shots.size())
                          ? "; a number of shots that has a large divisor up to 59 makes fewer"

@@ -1,5 +1,5 @@
-/// protocols/lidar/pattern_lidar.h - a LiDAR as data: any instrument that repeats one pattern of shots from one
-/// point. A flash LiDAR, a raster scanner, a spinning one and a velocimeter differ in their shots alone.
+/// protocols/lidar/pattern_lidar.h - a LiDAR described by data: any instrument that repeats one pattern of shots
+/// from one point. A flash LiDAR, a raster scanner, a spinning one and a velocimeter differ in their shots alone.
 ///
 /// Frame f starts f periods, in whole nanoseconds, after simulation time 0; its packets (point_packet.h) are sent
 /// evenly over the frame, each as soon as its shots are fired.
@@ -32,8 +32,8 @@ struct LidarPattern {
     std::vector<PatternShot> shots;  ///< of a frame, in firing order
     LidarField lit{};                ///< by each pulse
 
-    static constexpr std::size_t kMostShots = 1'000'000;
-    /// Poses are kept this long.
+    static constexpr std::size_t kMaxShots = 1'000'000;
+    /// Most for the frame and the latency together, because poses are kept for about this long.
     static constexpr double kLongest_s = 0.9;
 };
 

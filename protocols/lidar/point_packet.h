@@ -1,5 +1,5 @@
-/// protocols/lidar/point_packet.h - the bytes of narpa's own LiDAR packet, of the instruments that a file describes
-/// (pattern_lidar.h). README.md in this folder has the offsets.
+/// protocols/lidar/point_packet.h - the format of narpa's own LiDAR packet, for the instruments that a file
+/// describes (pattern_lidar.h). README.md in this folder has the offsets.
 ///
 /// A record states its shot's time and direction, so that a reader needs no calibration.
 #pragma once
@@ -28,7 +28,7 @@ struct PointRecord {
 struct PointPacket {
     static constexpr std::size_t kHeaderBytes = 40;
     /// So that a UDP datagram fits an Ethernet frame of 1500 bytes.
-    static constexpr std::size_t kMostRecords = (1500 - 28 - kHeaderBytes) / PointRecord::kBytes;
+    static constexpr std::size_t kMaxRecords = (1500 - 28 - kHeaderBytes) / PointRecord::kBytes;
 
     [[nodiscard]] static constexpr std::size_t bytes(std::size_t records) noexcept {
         return kHeaderBytes + records * PointRecord::kBytes;
@@ -48,7 +48,7 @@ struct PointPacket {
     [[nodiscard]] static PointRecord record(std::span<const std::uint8_t> packet, std::size_t i) noexcept;
     /// Writes the header, after all records: it has their checksum. `packet` has bytes(records).
     void write(std::span<std::uint8_t> packet) const noexcept;
-    /// Nothing: these bytes are no such packet, whole and unchanged.
+    /// Nothing: not a whole packet of this kind with a correct checksum.
     [[nodiscard]] static std::optional<PointPacket> read(std::span<const std::uint8_t> packet) noexcept;
 };
 

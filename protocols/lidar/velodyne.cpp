@@ -24,7 +24,7 @@ constexpr std::int64_t kHour_ns = 3600 * kSecond_ns;
 constexpr std::size_t kPositionTimeOffset = 198, kPpsOffset = kPositionTimeOffset + 4,
                       kSentenceOffset = kPpsOffset + 1 + 3, kPositionPacketBytes = kSentenceOffset + 306;
 
-/// What differs from one product to the next.
+/// Properties in which the products differ.
 struct Product {
     std::string_view name;
     std::uint8_t code;
@@ -37,7 +37,7 @@ struct Product {
     [[nodiscard]] constexpr std::int64_t block_period_ns() const noexcept {
         return kShotsPerBlock / lasers() * sequence_period_ns;
     }
-    /// Of a shot, after the block's start.
+    /// Time of a shot after the block's start.
     [[nodiscard]] constexpr std::int64_t shot_offset_ns(int shot_in_block) const noexcept {
         return shot_in_block / lasers() * sequence_period_ns + shot_in_block % lasers() * laser_period_ns;
     }
@@ -80,7 +80,8 @@ double fraction_of(double turns) {
     return fraction < 1 ? fraction : 0.0;
 }
 
-/// Azimuth of the rotor in revolutions, [0, 1). Whole seconds are taken apart, so that a long run keeps its angle.
+/// Azimuth of the rotor in revolutions, [0, 1). Whole seconds are reduced separately, so that a long run keeps the
+/// precision.
 double rotor_revolutions(std::int64_t t_ns, double rotation_hz) {
     const std::int64_t seconds = t_ns / kSecond_ns;
     const double whole = std::fmod(static_cast<double>(seconds) * rotation_hz, 1.0);
@@ -273,8 +274,8 @@ private:
         return VelodynePacket::strongest;
     }
 
-    /// Of this product, in this unit's return mode; either single mode is read as the other, as their packets
-    /// differ in nothing else.
+    /// The packet if it is of this product and return mode. Packets of the two single modes differ only in the
+    /// mode, so either one is accepted.
     [[nodiscard]] std::optional<VelodynePacket> read(std::span<const std::uint8_t> bytes) const noexcept {
         auto packet = VelodynePacket::read(bytes);
         if (packet && (packet->product != product_.code || (packet->mode == VelodynePacket::dual) != dual_))

@@ -33,7 +33,7 @@ struct VelodynePacket {
     std::uint8_t mode = strongest;
     std::uint8_t product = 0;
 
-    /// Nothing: the length, a block's flag or azimuth, the time or the mode is not of such a packet.
+    /// Nothing: length, block flag, azimuth, time or mode are not valid for such a packet.
     [[nodiscard]] static std::optional<VelodynePacket> read(std::span<const std::uint8_t> bytes) noexcept;
     void write(std::span<std::uint8_t, kBytes> bytes) const noexcept;
 };

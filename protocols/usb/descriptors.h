@@ -62,7 +62,7 @@ inline constexpr std::size_t kUsbDeviceDescriptorBytes = 18;
 [[nodiscard]] std::array<std::uint8_t, kUsbDeviceDescriptorBytes> encode_usb_device(
     const UsbDeviceDescriptor& device) noexcept;
 [[nodiscard]] std::optional<UsbDeviceDescriptor> decode_usb_device(std::span<const std::uint8_t> bytes) noexcept;
-/// What a high-speed device says of itself at the other speed: the same.
+/// Device qualifier: the properties of a high-speed device at full speed, here the same.
 [[nodiscard]] std::array<std::uint8_t, 10> encode_usb_qualifier(const UsbDeviceDescriptor& device) noexcept;
 
 struct UsbEndpoint {

@@ -9,10 +9,10 @@
 namespace narpa {
 namespace {
 
-// Of the identifier, as SocketCAN has them.
+// Flags in the identifier, as in SocketCAN.
 constexpr std::uint32_t kGsExtended = 0x8000'0000, kGsRemote = 0x4000'0000, kGsError = 0x2000'0000;
 constexpr std::uint32_t kGsExtendedMask = 0x1fff'ffff, kGsStandardMask = 0x7ff;
-// Of a frame.
+// Flags of a frame.
 constexpr std::uint8_t kGsOverflow = 1, kGsFd = 2, kGsBitRateSwitch = 4, kGsErrorState = 8;
 constexpr std::size_t kGsHeaderBytes = 12, kGsTimeBytes = 4;
 constexpr std::array<std::uint8_t, 16> kGsLengths{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
@@ -36,13 +36,13 @@ BitTimingRange get_range(const std::uint8_t* at) noexcept {
     return {word(0), word(1), word(2), word(3), word(4), word(5), word(6), word(7)};
 }
 
-/// No controller counts further: what has larger numbers is none.
-constexpr std::uint32_t kMostQuanta = 1024, kMostPrescaler = 65536;
+/// Above the limits of all controllers; larger numbers are refused.
+constexpr std::uint32_t kMaxQuanta = 1024, kMaxPrescaler = 65536;
 
 bool is_sound(const BitTimingRange& r) noexcept {
-    return r.tseg1_min >= 1 && r.tseg1_min <= r.tseg1_max && r.tseg1_max <= kMostQuanta && r.tseg2_min >= 1 &&
-           r.tseg2_min <= r.tseg2_max && r.tseg2_max <= kMostQuanta && r.sjw_max >= 1 && r.sjw_max <= kMostQuanta &&
-           r.brp_min >= 1 && r.brp_min <= r.brp_max && r.brp_max <= kMostPrescaler && r.brp_step >= 1;
+    return r.tseg1_min >= 1 && r.tseg1_min <= r.tseg1_max && r.tseg1_max <= kMaxQuanta && r.tseg2_min >= 1 &&
+           r.tseg2_min <= r.tseg2_max && r.tseg2_max <= kMaxQuanta && r.sjw_max >= 1 && r.sjw_max <= kMaxQuanta &&
+           r.brp_min >= 1 && r.brp_min <= r.brp_max && r.brp_max <= kMaxPrescaler && r.brp_step >= 1;
 }
 
 }  // namespace
@@ -87,8 +87,8 @@ std::optional<BitTiming> decode_gs_usb_bit_timing(std::span<const std::uint8_t> 
     const auto word = [&](std::size_t i) { return get_le<std::uint32_t>(&b[4 * i]); };
     const BitTiming t{word(0), word(1), word(2), word(3), word(4)};
     for (const std::uint32_t segment : {t.prop_seg, t.phase_seg1, t.phase_seg2, t.sjw})
-        if (segment > kMostQuanta) return std::nullopt;
-    if (t.brp == 0 || t.brp > kMostPrescaler || t.phase_seg2 == 0 || t.prop_seg + t.phase_seg1 == 0)
+        if (segment > kMaxQuanta) return std::nullopt;
+    if (t.brp == 0 || t.brp > kMaxPrescaler || t.phase_seg2 == 0 || t.prop_seg + t.phase_seg1 == 0)
         return std::nullopt;
     return t;
 }

@@ -28,7 +28,7 @@ enum class GsUsbRequest : std::uint8_t {
     state = 14,
 };
 
-/// What an adapter can do, and, of the first ones, what it is asked to do when a channel starts.
+/// Features of an adapter. Some of them are also requested when a channel starts.
 struct GsUsbFeature {
     static constexpr std::uint32_t kListenOnly = 1 << 0, kLoopBack = 1 << 1, kOneShot = 1 << 3, kTimeStamp = 1 << 4,
                                    kIdentify = 1 << 5, kFd = 1 << 8, kLimitsFd = 1 << 10, kErrorReports = 1 << 12,
@@ -63,7 +63,7 @@ struct GsUsbLimits {
     friend bool operator==(const GsUsbLimits&, const GsUsbLimits&) = default;
 };
 inline constexpr std::size_t kGsUsbLimitsBytes = 40, kGsUsbLimitsFdBytes = 72;
-/// Writes the long form where `data` is there and returns its size.
+/// Writes the limits, in the long form if `data` has a value, and returns the size.
 std::size_t encode_gs_usb_limits(const GsUsbLimits& limits,
                                  std::span<std::uint8_t, kGsUsbLimitsFdBytes> out) noexcept;
 /// Nothing: another size, no clock, or ranges that hold no bit timing.

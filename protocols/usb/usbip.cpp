@@ -8,7 +8,7 @@ namespace narpa {
 namespace {
 
 constexpr std::uint32_t kSubmit = 1, kUnlink = 2, kSubmitted = 3, kUnlinked = 4;
-constexpr std::uint32_t kNoPackets = 0xffff'ffff;  // newer kernels' number of packets of what is not isochronous
+constexpr std::uint32_t kNoPackets = 0xffff'ffff;  // packet count of non-isochronous transfers (new kernels)
 
 void put_usbip_text(std::uint8_t* at, std::size_t room, const std::string& text) noexcept {
     std::copy_n(text.begin(), std::min(text.size(), room - 1), at);

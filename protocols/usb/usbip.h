@@ -33,14 +33,14 @@ struct UsbIpOpHeader {
     friend bool operator==(const UsbIpOpHeader&, const UsbIpOpHeader&) = default;
 };
 inline constexpr std::size_t kUsbIpOpBytes = 8, kUsbIpBusIdBytes = 32, kUsbIpDeviceBytes = 312;
-/// What an import may answer (tools/usb/usbip/libsrc/usbip_common.h).
+/// Status of a refused import (tools/usb/usbip/libsrc/usbip_common.h).
 inline constexpr std::uint32_t kUsbIpBusy = 2, kUsbIpNoDevice = 4;
 
 /// Nothing: another version, or an operation that is none of these.
 [[nodiscard]] std::optional<UsbIpOpHeader> decode_usbip_op(
     std::span<const std::uint8_t, kUsbIpOpBytes> bytes) noexcept;
 [[nodiscard]] std::array<std::uint8_t, kUsbIpOpBytes> encode_usbip_op(const UsbIpOpHeader& header) noexcept;
-/// The bus id of an import request. Nothing: no end within its 32 bytes, or empty.
+/// The bus id of an import request. Nothing: not terminated within its 32 bytes, or empty.
 [[nodiscard]] std::optional<std::string> decode_usbip_bus_id(std::span<const std::uint8_t, kUsbIpBusIdBytes> bytes);
 
 struct UsbIpDevice {
@@ -70,7 +70,7 @@ struct UsbIpSubmit {
     UsbSetup setup{};  ///< where endpoint is 0
     friend bool operator==(const UsbIpSubmit&, const UsbIpSubmit&) = default;
 };
-/// Gives up a transfer.
+/// Cancels a transfer.
 struct UsbIpUnlink {
     std::uint32_t sequence = 0;
     std::uint32_t victim = 0;  ///< sequence of the transfer
@@ -78,18 +78,18 @@ struct UsbIpUnlink {
 };
 using UsbIpRequest = std::variant<UsbIpSubmit, UsbIpUnlink>;
 
-/// Nothing: no such command; an endpoint above 15; longer than kUsbIpLongestTransfer; isochronous. What follows
-/// cannot be told apart then, so the connection ends.
+/// Nothing: no such command; an endpoint above 15; longer than kUsbIpLongestTransfer; isochronous. The start of the
+/// next message is unknown then, so the connection ends.
 [[nodiscard]] std::optional<UsbIpRequest> decode_usbip_request(
     std::span<const std::uint8_t, kUsbIpHeaderBytes> bytes) noexcept;
 void encode_usbip_request(const UsbIpRequest& request, std::span<std::uint8_t, kUsbIpHeaderBytes> out) noexcept;
 
-/// The answer to a transfer or to giving one up.
+/// The answer to a transfer or to its cancellation.
 struct UsbIpReply {
     bool to_unlink = false;
     std::uint32_t sequence = 0;
-    std::int32_t status = 0;   ///< 0, or -errno as Linux numbers them: -32 stall, -104 given up
-    std::uint32_t length = 0;  ///< moved; towards the host, so many bytes follow
+    std::int32_t status = 0;   ///< 0, or -errno as Linux numbers them: -32 stall, -104 cancelled
+    std::uint32_t length = 0;  ///< bytes transferred; towards the host, they follow
     friend bool operator==(const UsbIpReply&, const UsbIpReply&) = default;
 };
 void encode_usbip_reply(const UsbIpReply& reply, std::span<std::uint8_t, kUsbIpHeaderBytes> out) noexcept;

@@ -33,7 +33,7 @@ struct UvcControl {
     static constexpr std::uint8_t kGain = 4;                             ///< of the processing unit
     static constexpr std::uint8_t kErrorCode = 2;                        ///< of the control interface
 };
-/// Of an exposure time.
+/// Unit of exposure times.
 inline constexpr std::int64_t kUvcExposureUnit_ns = 100'000;
 inline constexpr std::uint32_t kUvcClock_hz = 48'000'000;
 

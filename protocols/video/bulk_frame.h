@@ -1,4 +1,4 @@
-/// protocols/video/bulk_frame.h - what stands before the pixels of a frame on a USB bulk endpoint.
+/// protocols/video/bulk_frame.h - the header of a frame on a USB bulk endpoint.
 ///
 /// A frame is a header of 48 bytes and then its pixels, row after row; it ends with a short packet. README.md in
 /// this folder has the table. Identity and time of the frame are here because a bridge has no other place for them.

@@ -18,7 +18,7 @@ namespace narpa {
 /// `YUV4MPEG2 W640 H480 F10:1 Ip A1:1 Cmono` and a line feed; the frame rate is exactly 1 / period.
 Result<std::string> y4m_stream_header(const VideoFormat& format);
 
-/// Whether a stream of this header (its first line, without the line feed) has frames of this format. Its frame
+/// Ok if a stream with this header (its first line, without the line feed) has frames of this format. Its frame
 /// rate is not compared: no frame depends on it.
 Status check_y4m_stream_header(std::string_view line, const VideoFormat& format);
 
@@ -33,7 +33,7 @@ inline constexpr std::string_view kY4mFrameHeader = "FRAME\n";
 /// Writes the frame's samples in Y4M's order. Both spans hold frame_bytes(format); they do not overlap.
 void y4m_samples(const VideoFormat& format, std::span<const std::uint8_t> frame,
                  std::span<std::uint8_t> out) noexcept;
-/// The other way round.
+/// Writes a frame from Y4M's samples.
 void frame_from_y4m(const VideoFormat& format, std::span<const std::uint8_t> samples,
                     std::span<std::uint8_t> out) noexcept;
 

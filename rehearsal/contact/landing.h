@@ -1,4 +1,4 @@
-/// rehearsal/contact/landing.h - the limits of a landing and how they are measured.
+/// rehearsal/contact/landing.h - limits of a landing, and the values that they apply to.
 #pragma once
 
 #include "rehearsal/contact/port_state.h"
@@ -6,8 +6,8 @@
 
 namespace narpa::rehearsal {
 
-/// Of the chaser's port (the middle of its feet) when the first foot meets the ground; slope and step are those of
-/// the ground that it stands on.
+/// Motion limits of the chaser's port (the middle of its feet) when the first foot touches the ground; slope and
+/// step are those of the ground that it stands on.
 struct LandingLimits {
     double vertical_m_s = 1.5, horizontal_m_s = 0.5;
     double tilt_deg = 5, rate_deg_s = 3;
@@ -15,12 +15,12 @@ struct LandingLimits {
     double slope_deg = 10, step_m = 0.3;
 };
 
-/// `touchdown`: when the first foot meets the ground. `ground`: where the feet stand; none: slope and step are left
-/// out.
+/// `touchdown`: state when the first foot touches the ground. `ground`: under the feet; none: slope and step are
+/// left out.
 [[nodiscard]] ContactConditions landing_conditions(const LandingLimits& limits, const PortState& touchdown,
                                                    const std::optional<Footing>& ground);
 
-/// Where the feet are, in the site's axes.
+/// Positions of the feet, in the site's axes.
 [[nodiscard]] std::vector<Vec3> feet_at_site(std::span<const Vec3> feet_m, const PortState& state);
 
 }  // namespace narpa::rehearsal

@@ -13,7 +13,7 @@ Quat q_docked_chaser_port(const PortState& s) {
     return conjugate(T_port_docked().q) * s.T_port_chaser_port.q;
 }
 
-/// World axes.
+/// Angular rate in world axes.
 Vec3 rate_world(const Motion& m) {
     return m.T_world_body.q * m.rate_rad_s;
 }

@@ -1,9 +1,9 @@
 /// rehearsal/contact/port_state.h - the chaser's docking port relative to the target's: pose, velocity, rate, and
-/// the scalars that limits are set on. Dynamics, navigation and judge use these functions alone, so they agree bit
-/// for bit on equal inputs.
+/// the scalars that have limits. Dynamics, navigation and judge all use these functions, so that equal inputs give
+/// bit-identical results.
 ///
-/// Port axes: x out of the docking interface. Docked, the chaser's port axes are the target's turned by 180 degrees
-/// about z.
+/// Port axes: x out of the docking interface. When docked, the chaser's port axes are the target's rotated by 180
+/// degrees about z.
 #pragma once
 
 #include <vector>
@@ -14,7 +14,7 @@ namespace narpa::rehearsal {
 
 struct Vehicle;
 
-/// The chaser's port axes to the target's when docked.
+/// Transforms the chaser's port axes to the target's when docked.
 [[nodiscard]] inline Rigid3 T_port_docked() {
     return {{0, 0, 0, 1}, {}};
 }
@@ -40,12 +40,12 @@ struct PortState {
     [[nodiscard]] double roll_rad_s() const;
 };
 
-/// The motion of axes that are fixed to a body; applied to a port with the inverse transform it gives the body's.
+/// The motion of axes fixed to a body; applied to a port with the inverse transform it gives the body's motion.
 [[nodiscard]] Motion fixed_to(const Motion& body, const Rigid3& T_body_axes);
 
 /// Both motions are of the port axes.
 [[nodiscard]] PortState port_state(const Motion& target_port, const Motion& chaser_port);
-/// Its inverse: the motion of the chaser's port axes.
+/// Inverse of port_state(): the motion of the chaser's port axes.
 [[nodiscard]] Motion chaser_port_motion(const PortState& state, const Motion& target_port);
 
 /// The same from the motions of the bodies' axes, as in the scene and on CAN.
@@ -61,7 +61,7 @@ struct CaptureEnvelope {
     double pitch_yaw_deg = 4, roll_deg = 4, pitch_yaw_rate_deg_s = 0.20, roll_rate_deg_s = 0.20;
 };
 
-/// One quantity of a port state and its limits, which belong to the allowed range.
+/// One quantity of a port state and its limits, which are inclusive.
 struct ContactCondition {
     const char *name = "", *title = "", *unit = "";
     double value = 0, min = 0, max = 0;
@@ -72,7 +72,7 @@ using ContactConditions = std::vector<ContactCondition>;
 /// In the order of the standard's table.
 [[nodiscard]] ContactConditions contact_conditions(const CaptureEnvelope& limits, const PortState& state);
 
-/// All of them.
+/// True if all conditions hold.
 [[nodiscard]] bool within(const CaptureEnvelope& limits, const PortState& state);
 
 }  // namespace narpa::rehearsal

@@ -1,4 +1,5 @@
-/// rehearsal/contact/terrain.h - the ground about a landing site: the true surface of the scene's body, by rays.
+/// rehearsal/contact/terrain.h - the ground around a landing site: the true surface of the scene's body, by ray
+/// tracing.
 #pragma once
 
 #include <memory>
@@ -35,15 +36,15 @@ private:
     std::optional<Tracer> tracer_;
     BodyPoses at_;
     std::uint32_t body_ = 0;
-    double reach_m_ = 0;  ///< from above all of it to below
+    double reach_m_ = 0;  ///< ray length that spans the whole body vertically
 };
 
 /// The ground that feet stand on.
 struct Footing {
-    double slope_rad = 0;  ///< of the plane that fits the ground under the feet best, against the horizontal
-    double step_m = 0;     ///< largest height of the ground above that plane, within the circle about the feet
+    double slope_rad = 0;  ///< slope of the plane that best fits the ground under the feet, against the horizontal
+    double step_m = 0;     ///< largest height of the ground above that plane, within the circle around the feet
 };
-/// `feet_m`: three or more. None: there is no ground under one of them.
+/// `feet_m`: three or more. Returns none if there is no ground under one of them.
 [[nodiscard]] std::optional<Footing> footing(const Terrain& terrain, std::span<const Vec3> feet_m);
 
 }  // namespace narpa::rehearsal

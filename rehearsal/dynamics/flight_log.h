@@ -1,4 +1,4 @@
-/// rehearsal/dynamics/flight_log.h - the truth in files: truth.csv and dynamics.json.
+/// rehearsal/dynamics/flight_log.h - log files of the true motion: truth.csv and dynamics.json.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class TruthLog {
 public:
     static Result<TruthLog> create(const std::string& folder);
     void append(const Simulation& simulation);
-    /// An Error where not all of it could be written.
+    /// An Error if not everything could be written.
     Status close();
 
 private:

@@ -35,7 +35,7 @@ GroundForces GroundContact::press(const PortState& lander) {
         Vec3 across =
             -gear_.stiffness_n_m * along_ground(foot - *held_[i]) - gear_.damping_n_s_m * along_ground(velocity);
         const double most_n = gear_.friction * push_n;
-        if (const double n = norm(across); n > most_n) {  // slips: what it holds on to follows
+        if (const double n = norm(across); n > most_n) {  // slips: the anchor point follows the foot
             across = across * (most_n / n);
             held_[i] = foot + across / gear_.stiffness_n_m;
         }

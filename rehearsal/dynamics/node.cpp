@@ -21,11 +21,12 @@ namespace narpa::rehearsal {
 namespace {
 
 constexpr std::int64_t kShortWaitNs = 20'000'000;
-/// In real time poses are sent so long before their time of validity: a frame of that time then has that pose.
+/// In real time poses are sent this long before their time of validity, so that a frame of that time uses that
+/// pose.
 constexpr std::int64_t kLeadNs = 5'000'000;
 constexpr double kSiteOff_m = 0.5;
 constexpr const char* kConnectionLost = "the connection to the emulator was lost";
-constexpr std::int64_t kHeadStartNs = 500'000'000;  // at least, from the first heartbeat to time 0
+constexpr std::int64_t kHeadStartNs = 500'000'000;  // least time from the first heartbeat to time 0
 
 /// A body's pose commands.
 struct CommandedBody {
@@ -38,8 +39,8 @@ struct CommandedBody {
 struct CommandCounts {
     std::uint64_t applied = 0;
     std::uint64_t lost = 0;     ///< by the scenario's fault
-    std::uint64_t late = 0;     ///< came more than a period after their time
-    std::uint64_t refused = 0;  ///< of an unexpected time, or not newer than the last
+    std::uint64_t late = 0;     ///< arrived more than a period after their time
+    std::uint64_t refused = 0;  ///< unexpected time, or not newer than the last
 };
 
 class Node {
@@ -74,7 +75,7 @@ private:
             const std::int64_t next_ns = simulation_.t_ns() + scenario_.period_ns();
             while (simulation_.t_ns() < next_ns) {
                 if (auto moved = advance_to(next_pose_ns()); !moved) return moved;
-                if (simulation_.t_ns() == next_ns) break;  // its poses come after the report
+                if (simulation_.t_ns() == next_ns) break;  // the poses of this time follow the report
                 if (auto sent = send_poses(); !sent) return sent;
             }
         }
@@ -126,7 +127,7 @@ private:
         return Ok{};
     }
 
-    /// Commands that arrive meanwhile act from their time on, or at once where that is past. Returns early when
+    /// Commands that arrive meanwhile take effect at their time, or at once if that is past. Returns early when
     /// stopped.
     Status wait_until(std::int64_t t_ns) {
         for (;;) {
@@ -176,14 +177,14 @@ private:
         return Ok{};
     }
 
-    /// In lockstep: of this time, once. In real time: newer than the last, and at most a period ahead.
+    /// In lockstep: exactly the current time, once. In real time: newer than the last, and at most a period ahead.
     bool is_expected(std::int64_t t_ns, std::int64_t now_ns) const {
         if (commanded_ns_ && t_ns <= *commanded_ns_) return false;
         if (options_.lockstep) return t_ns == now_ns;
         return t_ns >= t_start_ns_ && t_ns <= now_ns + scenario_.period_ns();
     }
 
-    /// In lockstep nothing goes on after that, even if the bus comes back: messages are missing.
+    /// In lockstep this ends the run even if the bus comes back, as messages are missing.
     bool connection_lost() const { return bus_.counters().interface_down > 0; }
 
     // --- Motion and its messages ---
@@ -191,7 +192,7 @@ private:
         return (simulation_.t_ns() / scenario_.pose_period_ns() + 1) * scenario_.pose_period_ns();
     }
 
-    /// Applies commands on the way whose time has come.
+    /// Applies the pending commands that fall due on the way.
     Status advance_to(std::int64_t t_ns) {
         while (!pending_.empty() && pending_.front().t_ns - t_start_ns_ <= t_ns) {
             const ActuatorCommand command = pending_.front();
@@ -228,7 +229,7 @@ private:
         return send(encode(DynamicsReport{report_counter_++, clock_time_ns(), t_start_ns_, phase}, fd_));
     }
 
-    /// The chaser last: its command lets the emulator advance to this time.
+    /// The chaser is sent last: its command lets the emulator advance to this time.
     Status send_poses() {
         const Truth truth = simulation_.truth();
         if (attractor_)
@@ -248,7 +249,7 @@ private:
         return send(frames);
     }
 
-    /// In real time a frame that the bus does not take is dropped and counted; in lockstep it is repeated.
+    /// In real time a frame that the bus does not accept is dropped and counted; in lockstep sending is retried.
     Status send(const FrameSet& frames) {
         const std::int64_t deadline_ns = monotonic_ns() + std::llround(options_.patience_s * 1e9);
         for (const CanFrame& frame : frames)
@@ -281,7 +282,7 @@ private:
     std::int64_t t_start_ns_ = 0;
     std::int64_t next_ns_ = 0;                  // real time: of the next poses
     std::optional<std::int64_t> commanded_ns_;  // of the newest command
-    std::deque<ActuatorCommand> pending_;       // real time: their time has not come, rising
+    std::deque<ActuatorCommand> pending_;       // real time: commands not due yet, in order of time
     std::uint8_t report_counter_ = 0, attitude_counter_ = 0;
     std::uint64_t poses_ = 0;
     CommandCounts counts_;
@@ -359,7 +360,7 @@ std::string ending_in_words(const std::string& ending) {
 
 }  // namespace
 
-std::string in_words(const nlohmann::json& d) {
+std::string to_text(const nlohmann::json& d) {
     const nlohmann::json &commands = d["actuator_commands"], &bus = d["bus"];
     return fmt::format(
         "{}: seed {}, {:.3f} s, {}; {} actuator commands applied, {} lost, {} late, {} refused, {} bad frames; {} "

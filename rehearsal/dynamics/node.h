@@ -1,8 +1,8 @@
 /// rehearsal/dynamics/node.h - the dynamics as a program on the bus: poses, attitude reports and phases out,
 /// thruster commands in.
 ///
-/// In lockstep the time waits at every control period for its command. In real time the clock is the emulator's,
-/// and a command acts from its time on, or from its arrival where that is later.
+/// In lockstep, time stops at every control period until its command arrives. In real time the clock is the
+/// emulator's, and a command takes effect at its time, or at its arrival if that is later.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ struct DynamicsOptions {
 Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOptions& options, CanBus& bus,
                                     const StopFlag& stop);
 
-/// A line for people on that document.
-[[nodiscard]] std::string in_words(const nlohmann::json& document);
+/// A one-line summary of that document.
+[[nodiscard]] std::string to_text(const nlohmann::json& document);
 
 }  // namespace narpa::rehearsal

@@ -16,7 +16,7 @@ Translation free_motion(double dt, const Vec3& a, const Translation& x) {
     return {x.position_m + dt * x.velocity_m_s + (0.5 * dt * dt) * a, x.velocity_m_s + dt * a};
 }
 
-/// From rest at the origin under the acceleration a, LVLH axes.
+/// Motion from rest at the origin under the constant acceleration a, LVLH axes.
 Translation clohessy_wiltshire_push(double n, double t, const Vec3& a) {
     const double nt = n * t, s = std::sin(nt), half = std::sin(0.5 * nt);
     const double versine = 2 * half * half;  // 1 - cos
@@ -51,7 +51,7 @@ Vec3 gravity_difference(double mu, const Vec3& R, const Vec3& r) {
     return (-mu / (square * std::sqrt(square))) * (r + f * (R + r));
 }
 
-/// `rates(after_s, state)`: derivatives so long after the start of the step h.
+/// `rates(after_s, state)`: derivatives at after_s from the start of the step h.
 template <class Rates>
 Translation runge_kutta(double h, const Translation& x, const Rates& rates) {
     const auto moved = [&](const Translation& rate, double by) {
@@ -71,10 +71,10 @@ Translation two_body_step(const Orbit& orbit, double t, double h, const Vec3& a,
     });
 }
 
-/// Over the ground of a planet that turns.
+/// One step over the ground of a rotating planet.
 Translation surface_step(const Orbit& orbit, double t, double h, const Vec3& a, const Translation& x) {
     return runge_kutta(h, x, [&](double after_s, const Translation& s) {
-        return Translation{s.velocity_m_s, orbit.fall_m_s2(t + after_s, s.position_m) + a};
+        return Translation{s.velocity_m_s, orbit.relative_free_fall_m_s2(t + after_s, s.position_m) + a};
     });
 }
 

@@ -15,12 +15,12 @@ struct Translation {
     Vec3 position_m{}, velocity_m_s{};
 };
 
-/// The state dt_s later. `acceleration_m_s2`: of the thrusters, world axes, constant (Clohessy-Wiltshire: constant
+/// The state dt_s later. `acceleration_m_s2`: by the thrusters, world axes, constant (Clohessy-Wiltshire: constant
 /// in LVLH, with the value of mid-step). Free and Clohessy-Wiltshire: exact, in closed form. Two bodies: the
-/// target's circle is exact; the gravity difference has the form of R. Battin ("An Introduction to the Mathematics
-/// and Methods of Astrodynamics", 1999, section 8.5), which does not cancel against the orbit's radius, and is
-/// integrated by RK4 in steps of at most a second: error 1e-12 of the distance after an orbit at 400 km.
-/// Surface: gravity with J2 less the acceleration of the ground, by the same steps.
+/// target's circular orbit is exact; the gravity difference has the form of R. Battin ("An Introduction to the
+/// Mathematics and Methods of Astrodynamics", 1999, section 8.5), which avoids cancellation against the orbit's
+/// radius, and is integrated by RK4 in steps of at most a second: error 1e-12 of the distance after an orbit at 400
+/// km. Surface: gravity with J2 minus the acceleration of the ground, in the same steps.
 [[nodiscard]] Translation propagated(const Orbit& orbit, double t_s, double dt_s, const Vec3& acceleration_m_s2,
                                      const Translation& from);
 
@@ -34,7 +34,7 @@ struct Attitude {
 
 class RigidBody {
 public:
-    /// About the centre of mass, body axes; symmetric and positive definite.
+    /// Inertia about the centre of mass, body axes; symmetric and positive definite.
     explicit RigidBody(const Eigen::Matrix3d& inertia_kg_m2);
 
     /// The state dt_s later; the torque is about the centre of mass, constant in body axes. Rates by RK4, attitude

@@ -10,20 +10,20 @@
 namespace narpa::rehearsal {
 namespace {
 
-constexpr std::int64_t kLongestStepNs = 50'000'000;  // error: forces rotate with the body
-constexpr double kPortRadiusM = 1;                   // with more lateral distance the ports pass each other
+constexpr std::int64_t kLongestStepNs = 50'000'000;  // limits the error from forces that rotate with the body
+constexpr double kPortRadiusM = 1;                   // beyond this lateral distance the ports miss each other
 constexpr double kRestitution = 0.3;
 constexpr std::int64_t kAfterCaptureNs = 2'000'000'000, kAfterBounceNs = 10'000'000'000;
-constexpr double kLeftDistances = 2;   // of the start's distance
-constexpr double kGravity0 = 9.80665;  // m/s^2, by which specific impulses are given
+constexpr double kLeftDistances = 2;   // a chaser further away than this, over its start distance, has left
+constexpr double kGravity0 = 9.80665;  // standard gravity, m/s^2, for specific impulses
 
-// Feet on the ground: the period of a lander's springs is some hundred of these steps.
+// With feet on the ground: the period of a lander's springs is a few hundred of these steps.
 constexpr std::int64_t kContactStepNs = 1'000'000;
 constexpr double kNearGroundM = 0.1;
 constexpr double kStillM_s = 0.02, kStillRad_s = 0.2 * kDegree;
 constexpr std::int64_t kStillNs = 1'000'000'000, kAfterLandingNs = 1'000'000'000;
 
-/// A motion in the steps of a pose command; as it is where it does not fit one.
+/// A motion quantised as by a pose command; unchanged if it exceeds the command's range.
 Motion as_transmitted(const Motion& motion) {
     PoseCommand command{0, 0, motion};
     PoseDecoder decoder(0);
@@ -44,7 +44,7 @@ Simulation::Simulation(const Scenario& scenario, std::uint64_t seed, std::shared
     place_bodies(seed);
 }
 
-/// The target as in the scene, the chaser at the nominal start plus its dispersion.
+/// Places the target as in the scene, and the chaser at the nominal start plus its dispersion.
 void Simulation::place_bodies(std::uint64_t seed) {
     std::mt19937_64 draws = engine(seed, Stream::start);
     draws_.position = draw_normal(draws);
@@ -88,10 +88,10 @@ bool Simulation::apply(const ActuatorCommand& command) {
     return true;
 }
 
-/// In steps over which forces are constant.
+/// Advances in steps over which forces are constant.
 void Simulation::advance_to(std::int64_t t_ns) {
     if (ground_) return advance_lander(t_ns);
-    if (at_contact_) part_or_hold();
+    if (at_contact_) rebound_or_hold();
     while (state_.t_ns < t_ns) {
         const std::int64_t from_ns = state_.t_ns;
         const std::int64_t until_ns =
@@ -112,7 +112,7 @@ void Simulation::advance_to(std::int64_t t_ns) {
     }
 }
 
-/// Next start or end of a fault that is not a thruster's.
+/// Next start or end of a target_rate fault.
 std::int64_t Simulation::next_fault_ns(std::int64_t t_ns) const {
     std::int64_t next = std::numeric_limits<std::int64_t>::max();
     for (const Fault& f : scenario_.faults)
@@ -121,7 +121,7 @@ std::int64_t Simulation::next_fault_ns(std::int64_t t_ns) const {
     return next;
 }
 
-/// By the faults that start or end in (after_ns, until_ns]. The end of a fault undoes its change.
+/// Applies the target_rate faults that start or end in (after_ns, until_ns]. The end of a fault undoes its change.
 void Simulation::change_target_rate(std::int64_t after_ns, std::int64_t until_ns) {
     for (const Fault& f : scenario_.faults) {
         if (f.kind != Fault::Kind::target_rate) continue;
@@ -200,7 +200,7 @@ bool Simulation::passes_plane(const State& before, const State& then) const {
     return port(before).position_m().x > 0 && port(then).position_m().x <= 0;
 }
 
-/// The first nanosecond at which the chaser's port has reached the plane, and before `before_ns`.
+/// State at the first nanosecond at which the chaser's port has reached the plane, before `before_ns`.
 Simulation::State Simulation::at_plane(const Loads& loads, std::int64_t dt_ns, std::int64_t before_ns) const {
     std::int64_t not_yet = 0, reached = dt_ns;
     while (reached - not_yet > 1) {
@@ -215,8 +215,8 @@ bool Simulation::ports_meet(const State& state) const {
     return p.lateral_m() <= kPortRadiusM && p.closing_m_s() > 0;
 }
 
-/// Whether it captures is decided on the poses in the steps that travel on CAN: the judge, who has no others,
-/// decides alike at the limits.
+/// Capture is decided on the poses as quantised on CAN: the judge, which has only these, then decides alike at the
+/// limits.
 void Simulation::touch(const State& met, const Loads& loads) {
     fire_for(loads, met.t_ns - state_.t_ns);
     state_ = met;
@@ -228,7 +228,7 @@ void Simulation::touch(const State& met, const Loads& loads) {
     at_contact_ = true;
 }
 
-void Simulation::part_or_hold() {
+void Simulation::rebound_or_hold() {
     at_contact_ = false;
     if (phase_ != DynamicsPhase::captured) return rebound(state_);
     hold();
@@ -241,7 +241,7 @@ std::optional<double> Simulation::clearance_m() const {
     return ground_->clearance_m(port());
 }
 
-/// As advance_to; in short steps where the feet may meet the ground within a long one.
+/// Like advance_to, but in short steps if the feet may touch the ground within a long one.
 void Simulation::advance_lander(std::int64_t t_ns) {
     while (state_.t_ns < t_ns) {
         const std::int64_t from_ns = state_.t_ns;
@@ -266,7 +266,7 @@ void Simulation::advance_lander(std::int64_t t_ns) {
     }
 }
 
-/// Of the ground on the chaser, body axes, about its centre of mass.
+/// Forces of the ground on the chaser, body axes, about its centre of mass.
 Loads Simulation::ground_loads() {
     const PortState p = port();
     const GroundForces f = ground_->press(p);
@@ -277,7 +277,7 @@ Loads Simulation::ground_loads() {
     return {force, q_body_site * f.torque_n_m + cross(arm, force)};
 }
 
-/// True where the phase changes.
+/// Returns true if the phase changes.
 bool Simulation::judge_landing(double deepest_m) {
     const PortState p = port();
     if (phase_ == DynamicsPhase::flying) {
@@ -301,7 +301,7 @@ bool Simulation::judge_landing(double deepest_m) {
     return true;
 }
 
-/// On the target from now on.
+/// Fixes the chaser to the target from now on.
 void Simulation::hold() {
     settled_ns_ = state_.t_ns;
     const Quat q_target_world = conjugate(state_.target.q_world_body);

@@ -1,9 +1,9 @@
 /// rehearsal/dynamics/simulation.h - the motion of two bodies near each other from a scenario's time 0 to its end:
-/// orbit, attitude, thrusters, contact. No clock and no bus; the same scenario, seed and commands give the same
-/// numbers.
+/// orbit, attitude, thrusters, contact. Has no clock and no bus: equal scenario, seed and commands give equal
+/// results.
 ///
-/// Contact does not move the target: its centre of mass is the world's origin, and only the relative motion
-/// matters. Contact is between docking ports, or of a landing gear with the ground.
+/// Contact does not move the target: its centre of mass is the world's origin, and only relative motion matters.
+/// Contact is between docking ports, or between a landing gear and the ground.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ struct Truth {
 };
 
 /// Random draws of unit variance, in this order; multiplied by the scenario's standard deviations they are the
-/// start's dispersion.
+/// dispersion of the start.
 struct StartDraws {
     Vec3 position, velocity, attitude, rate;
 };
@@ -37,7 +37,7 @@ struct ContactEvent {
     bool captured = false;  ///< or landed
 };
 
-/// Why a run is over; left: the chaser has retreated far beyond its start.
+/// Why a run has ended; left: the chaser has retreated far beyond its start.
 enum class Ending : std::uint8_t { not_yet, captured, bounced, duration, navigation_done, left, landed, crashed };
 inline constexpr std::array<std::string_view, 8> kEndings{"not_yet",         "captured", "bounced", "duration",
                                                           "navigation_done", "left",     "landed",  "crashed"};
@@ -49,10 +49,10 @@ public:
 
     /// The scenario's time.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return state_.t_ns; }
-    /// The thruster command from now on; false: lost by a fault.
+    /// Sets the thruster command from now on; returns false if a fault loses it.
     bool apply(const ActuatorCommand& command);
-    /// Advances to t_ns, or to a change of phase() if that is before; at contact of ports the motion is the one
-    /// just before. The next call continues from there.
+    /// Advances to t_ns, or to an earlier change of phase(); at contact of ports the state is that just before. The
+    /// next call continues from there.
     void advance_to(std::int64_t t_ns);
     /// Star tracker and gyroscope, with noise.
     [[nodiscard]] AttitudeReport measure_attitude();
@@ -60,10 +60,10 @@ public:
     [[nodiscard]] Truth truth() const;
     [[nodiscard]] PortState port() const;
     [[nodiscard]] DynamicsPhase phase() const noexcept { return phase_; }
-    /// The first.
+    /// The first contact.
     [[nodiscard]] const std::optional<ContactEvent>& contact() const noexcept { return contact_; }
     [[nodiscard]] Ending ending() const;
-    /// Of the chaser; an engine burns propellant.
+    /// Mass of the chaser, which decreases as an engine burns propellant.
     [[nodiscard]] double mass_kg() const noexcept { return state_.mass_kg; }
     /// Height of the lowest foot above the ground, where there is a landing gear.
     [[nodiscard]] std::optional<double> clearance_m() const;
@@ -72,7 +72,7 @@ public:
     [[nodiscard]] const Loads& fired() const noexcept { return fired_; }
     [[nodiscard]] const StartDraws& start_draws() const noexcept { return draws_; }
     [[nodiscard]] const ThrusterModel& thrusters() const noexcept { return thrusters_; }
-    /// The last one that was not lost.
+    /// The last command that was not lost.
     [[nodiscard]] const ActuatorCommand& command() const noexcept { return command_; }
 
 private:
@@ -96,7 +96,7 @@ private:
     [[nodiscard]] State at_plane(const Loads& loads, std::int64_t dt_ns, std::int64_t before_ns) const;
     [[nodiscard]] bool ports_meet(const State& state) const;
     void touch(const State& met, const Loads& loads);
-    void part_or_hold();
+    void rebound_or_hold();
     void rebound(State& state) const;
     void advance_lander(std::int64_t t_ns);
     [[nodiscard]] Loads ground_loads();
@@ -110,13 +110,13 @@ private:
     StartDraws draws_{};
     State state_;
     DynamicsPhase phase_ = DynamicsPhase::flying;
-    bool at_contact_ = false;       // at a contact from which advance_to has yet to continue
+    bool at_contact_ = false;       // at a contact, before advance_to continues
     std::optional<Rigid3> T_held_;  // captured: chaser's body at its centre of mass, in the target's
     std::optional<ContactEvent> contact_;
     std::optional<GroundContact> ground_;
-    double deepest_m_ = 0;                  // of the feet in the step that follows
-    std::optional<std::int64_t> still_ns_;  // on its feet, since then
-    std::int64_t settled_ns_ = 0;           // landed or crashed
+    double deepest_m_ = 0;                  // largest penetration of a foot, for the next step
+    std::optional<std::int64_t> still_ns_;  // at rest on its feet since then
+    std::int64_t settled_ns_ = 0;           // time of landing or crash
     Loads fired_{};
     ActuatorCommand command_{};
 };

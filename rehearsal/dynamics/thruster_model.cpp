@@ -53,7 +53,7 @@ void ThrusterModel::fire(int group, double impulse, std::int64_t t_ns) {
     const double wanted_s = impulse / full(group);
     if (!(wanted_s >= thrusters_.min_on_s) || wanted_s == 0) return;
     const std::int64_t on_ns = std::min(std::max<std::int64_t>(std::llround(wanted_s * 1e9), 1), period_ns_);
-    // A pulse ends at a whole nanosecond: what that is off, its strength makes good.
+    // A pulse ends at a whole nanosecond: its force compensates the rounding of its duration.
     const double even_out = on_ns == period_ns_ ? 1 : wanted_s / (static_cast<double>(on_ns) * 1e-9);
     const double gain = 1 + thrusters_.gain_sigma * std::normal_distribution<double>()(gains_);
     pulses_[group] = {t_ns, t_ns + on_ns, full(group) * even_out * std::max(gain, 0.0)};

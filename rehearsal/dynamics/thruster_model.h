@@ -1,4 +1,4 @@
-/// rehearsal/dynamics/thruster_model.h - what the chaser's thrusters make of a command: pulses of full force, each
+/// rehearsal/dynamics/thruster_model.h - forces of the chaser's thrusters for a command: pulses of full force, each
 /// with its own error.
 #pragma once
 
@@ -31,13 +31,13 @@ enum class Stream : std::uint32_t { start = 1, misalignment, pulses, attitude_se
     return v;
 }
 
-/// Of the scenario's seconds; infinity stays the end of time.
+/// Nanoseconds of a scenario's seconds; infinity becomes the largest value.
 [[nodiscard]] inline std::int64_t to_ns(double t_s) {
     constexpr double kEnd = 9.2e18;
     return t_s * 1e9 < kEnd ? std::llround(t_s * 1e9) : std::numeric_limits<std::int64_t>::max();
 }
 
-/// On the chaser, body axes; the torque is about the centre of mass.
+/// Force and torque on the chaser, body axes; the torque is about the centre of mass.
 struct Loads {
     Vec3 force_n{}, torque_n_m{};
 };
@@ -45,17 +45,17 @@ struct Loads {
 /// In the order of kThrusterGroupNames.
 inline constexpr int kThrusterGroups = static_cast<int>(kThrusterGroupNames.size());
 
-/// A group fires with its full force or not at all. Of a command, each of the six impulses is for the group in its
-/// direction, which fires for |impulse| / force seconds from the command's time on: not at all where that is less
-/// than min_on_s, for the control period at most. A pulse has its own error of force, a group one of direction. An
-/// engine in a group's place burns for the whole period with the force impulse / period, within its limits; it is
-/// off where the impulse is 0.
+/// A group fires with its full force or not at all. Each of a command's six impulses is for the group in its
+/// direction, which fires for |impulse| / force seconds from the command's time on: not at all if that is less than
+/// min_on_s, and for at most the control period. Each pulse has its own error of force, each group one of
+/// direction. An engine in place of a group burns for the whole period with the force impulse / period, within its
+/// limits; it is off if the impulse is 0.
 class ThrusterModel {
 public:
-    /// Faults of other kinds are passed over; those of thrusters name a group.
+    /// Ignores faults of other kinds; those of thrusters name a group.
     ThrusterModel(const Scenario& scenario, std::uint64_t seed);
 
-    /// In place of what an earlier command has left to do.
+    /// Replaces the rest of an earlier command.
     void fire(const ActuatorCommand& command, std::int64_t t_ns);
     /// Constant from t_ns to next_change_ns(t_ns).
     [[nodiscard]] Loads loads(std::int64_t t_ns) const;

@@ -21,7 +21,7 @@ std::optional<Motion> MotionTrack::at(std::int64_t t_ns) const {
     const auto& [tb, b] = *after;
     const double h = static_cast<double>(tb - ta) * 1e-9, u = static_cast<double>(t_ns - ta) * 1e-9 / h;
     const Vec3 pa = a.T_world_body.t, pb = b.T_world_body.t, va = a.velocity_m_s, vb = b.velocity_m_s;
-    // Hermite: what is added to the straight line vanishes at both ends.
+    // Hermite interpolation: the terms added to the straight line vanish at both ends.
     const Vec3 line = (pb - pa) / h, bend_a = va - line, bend_b = vb - line;
     Motion m;
     m.T_world_body.t = pa + (pb - pa) * u + (bend_a * ((1 - u) * (1 - u) * u) + bend_b * ((u - 1) * u * u)) * h;
@@ -33,7 +33,7 @@ std::optional<Motion> MotionTrack::at(std::int64_t t_ns) const {
 
 namespace {
 
-/// Origin of the chaser's port, target's port axes.
+/// Position of the chaser's port origin, target's port axes.
 Vec3 port_position_m(const Scenario& scenario, const Rigid3& T_chaser_target) {
     return (inverse(T_chaser_target * scenario.target.T_body_port) * scenario.chaser.T_body_port).t;
 }
@@ -113,7 +113,7 @@ bool BusRecord::take(MessageDecoder<Message>& decoder, const CanFrame& frame, st
     return count(decoder.accept(frame, t_reference_ns, out));
 }
 
-/// True for a complete message; counts what is neither that nor a part of one.
+/// True for a complete message; counts frames that cannot be decoded.
 bool BusRecord::count(DecodeStatus status) {
     refused += status != DecodeStatus::not_mine && status != DecodeStatus::partial &&
                status != DecodeStatus::complete && status != DecodeStatus::duplicate;
@@ -126,7 +126,8 @@ std::optional<TruthState> BusRecord::truth_at(std::int64_t t_ns) const {
     return TruthState{port_state(scenario_.target, *target, scenario_.chaser, *chaser), t_ns};
 }
 
-/// At the chaser's times for which the target's pose is known; there is none before the target's first command.
+/// Computes the truth at the chaser's times for which the target's pose is known; none before the target's first
+/// command.
 std::size_t BusRecord::compare_with_truth() {
     std::size_t n = 0;
     while (!target_.empty() && !chaser_times_.empty() && chaser_times_.front() <= target_.newest_ns()) {

@@ -2,7 +2,7 @@
 /// the truth of the same time.
 ///
 /// Each stream is ordered by its own times: two receivers that get the messages of different senders in different
-/// orders make the same record.
+/// orders obtain the same record.
 #pragma once
 
 #include <cstddef>
@@ -23,10 +23,10 @@ namespace narpa::rehearsal {
 
 class MotionTrack {
 public:
-    /// False: not newer than the last one, and not taken.
+    /// Returns false if it is not newer than the last one; it is then ignored.
     bool push(std::int64_t t_ns, const Motion& motion);
-    /// Exact at the times of commands; between them a cubic through positions and velocities, the shortest arc
-    /// between attitudes. Nothing before the first and after the last.
+    /// Exact at the times of commands; in between a cubic through positions and velocities, and the shortest arc
+    /// between attitudes. Empty before the first and after the last.
     [[nodiscard]] std::optional<Motion> at(std::int64_t t_ns) const;
     [[nodiscard]] bool empty() const { return samples_.empty(); }
     [[nodiscard]] std::int64_t newest_ns() const { return samples_.back().t_ns; }
@@ -44,7 +44,7 @@ struct TruthState : PortState {
     std::int64_t t_ns = 0;  ///< simulation clock
 };
 
-/// An estimate with the truth of the same time. Errors and standard deviations: the target in the chaser's body
+/// An estimate with the truth of the same time. Errors and standard deviations: of the target in the chaser's body
 /// axes.
 struct JudgedEstimate {
     std::int64_t t_ns = 0;
@@ -55,11 +55,11 @@ struct JudgedEstimate {
 
     /// Largest |error| / standard deviation of the six.
     [[nodiscard]] double largest_in_sigmas() const;
-    /// Sum of their squares: 6 on average where the covariance is right (correlations do not travel on CAN).
+    /// Sum of their squares: 6 on average if the covariance is right (correlations are not sent on CAN).
     [[nodiscard]] double nees() const;
 };
 
-/// Flags of the heartbeats, counted.
+/// Number of heartbeats, and of those with each flag set.
 struct HeartbeatCount {
     std::uint64_t received = 0, stale = 0, deadline_missed = 0, output_dropped = 0;
     bool lockstep = false;
@@ -94,7 +94,7 @@ public:
     }
     /// Estimates without a truth of their time so far.
     [[nodiscard]] std::size_t unjudged() const { return waiting_.size(); }
-    /// At a time that the pose commands of both bodies cover.
+    /// Empty unless the pose commands of both bodies cover this time.
     [[nodiscard]] std::optional<TruthState> truth_at(std::int64_t t_ns) const;
     /// The navigation's command that was valid at that time.
     [[nodiscard]] const ActuatorCommand* command_before(std::int64_t t_ns) const;
@@ -115,7 +115,7 @@ private:
     const Scenario& scenario_;
     PoseDecoder target_decoder_, chaser_decoder_;
     MotionTrack target_, chaser_;
-    std::deque<std::int64_t> chaser_times_;  ///< without the target's command of that time so far
+    std::deque<std::int64_t> chaser_times_;  ///< waiting for the target's command of that time
     MessageDecoder<ActuatorCommand> command_decoder_;
     MessageDecoder<NavigationEstimate> estimate_decoder_;
     MessageDecoder<DynamicsReport> report_decoder_;

@@ -66,7 +66,7 @@ void Judge::check(const JudgedEstimate& estimate) {
     const bool reported = position_.first || attitude_.first;
     sigmas_.check(estimate, limits.sigmas - estimate.largest_in_sigmas());
     measured_ |= estimate.frames + estimate.sweeps > 0;
-    if (!measured_) return;  // until then the estimate is the scenario's start
+    if (!measured_) return;  // before that the estimate is the scenario's start
     const bool too_far = position_.check(estimate, limits.position_m - norm(estimate.position_error_m));
     const bool too_turned =
         attitude_.check(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDegPerRad);
@@ -114,7 +114,7 @@ LedgerStatistics Judge::ledger_statistics() const {
         render.push_back(static_cast<double>(l.t_render_end_ns - l.t_render_start_ns) * 1e-6);
         if (l.t_hand_over_ns == 0 || l.delivery == Delivery::nothing) continue;
         ++s.handed_over;
-        // Before the first pose and after the last, no pose belongs to the frame.
+        // Frames before the first pose or after the last do not have a pose of their own.
         if (l.t_pose_ns >= bus_.t_start_ns() && (!finished || l.t_exposure_mid_ns <= finished->t_ns))
             latency.push_back(static_cast<double>(l.t_hand_over_ns - l.t_pose_ns) * 1e-6);
         exposed.push_back(static_cast<double>(l.t_hand_over_ns - l.t_exposure_mid_ns) * 1e-6);

@@ -33,13 +33,13 @@ struct LimitMonitor {
     }
 };
 
-/// "leg 2 \"hold\"", of an index as the commands carry it.
+/// "leg 2 \"hold\"", for a leg index as in the commands.
 [[nodiscard]] std::string leg_text(const Scenario& scenario, std::size_t leg);
 
-/// Frames in, a verdict out. Its only inputs are the scenario and the bus: a log gives the same verdict as the live
-/// bus.
+/// Computes a verdict from CAN frames. The scenario and the bus are its only inputs: a log gives the same verdict
+/// as the live bus.
 ///
-/// After capture the two are one body: corridor, distances and estimates are judged up to that instant. A lander is
+/// After capture the two are one body: corridor, distances and estimates are judged up to that time. A lander is
 /// judged up to its touchdown, and then by the ground that it stands on, for which the scene is read.
 class Judge {
 public:
@@ -50,14 +50,14 @@ public:
 
     /// `t_reference_ns`: a time within 39 h of the simulation clock, as a log's stamp.
     void accept(const CanFrame& frame, std::int64_t t_reference_ns);
-    /// The verdict on all frames so far. `trouble`: what ended the run, where that is not on the bus; it fails the
+    /// The verdict on all frames so far. `trouble`: what ended the run, if that is not on the bus; it fails the
     /// run.
     [[nodiscard]] Verdict finish(const std::string& trouble = {}) const;
 
     [[nodiscard]] const BusRecord& bus() const { return bus_; }
-    /// The dynamics have reported the end.
+    /// True if the dynamics have reported the end.
     [[nodiscard]] bool finished() const { return bus_.first_report(DynamicsPhase::finished) != nullptr; }
-    /// "the navigation sent nothing; last received: ...": whose message is due next.
+    /// "the navigation sent nothing; last received: ...": the program whose message is due next.
     [[nodiscard]] std::string awaited() const;
     /// Gates that have failed so far.
     [[nodiscard]] std::size_t failures() const { return failures_; }
@@ -90,12 +90,12 @@ private:
     std::size_t failures_ = 0;
     std::optional<std::int64_t> t_captured_ns_;     ///< or landed
     std::optional<std::int64_t> t_contact_ns_;      ///< captured, bounced or touched down, whichever came first
-    std::optional<std::int64_t> t_last_judged_ns_;  ///< nothing that moves is judged later
+    std::optional<std::int64_t> t_last_judged_ns_;  ///< motion is judged up to this time
     bool abort_reported_ = false, contact_judged_ = false, measured_ = false;
 
     LimitMonitor<TruthState> corridor_, keep_out_, distance_;
     LimitMonitor<JudgedEstimate> position_, attitude_,
-        sigmas_;  ///< largest errors, and those beyond the gate's sigmas
+        sigmas_;  ///< largest errors, and those in standard deviations for the gate
 };
 
 }  // namespace narpa::rehearsal

@@ -34,9 +34,9 @@ std::string last_message(const BusRecord& bus, std::int64_t t_ns) {
     return t_ns == BusRecord::kNever ? "never" : fmt::format("at t = {:.3f} s", bus.seconds(t_ns));
 }
 
-/// The program whose message was due next and did not come: why a run broke off.
-/// In lockstep each program waits for the one before: poses, the emulator's heartbeat of their time, the command.
-/// In real time none waits: it is the one that stopped first.
+/// The program whose message was due next and did not arrive: why a run broke off. In lockstep each program waits
+/// for the one before: poses, the emulator's heartbeat of their time, the command. In real time none waits: it is
+/// the program that stopped first.
 std::string missing_sender(const Scenario& scenario, const BusRecord& bus) {
     const std::int64_t slack = bus.heartbeats.lockstep ? 1'000'000 : 2 * scenario.period_ns();
     const std::int64_t t_report = bus.reports.empty() ? BusRecord::kNever : bus.reports.back().t_ns;
@@ -70,7 +70,7 @@ std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, cons
     return text;
 }
 
-/// A limit on every pose; `words` describes one.
+/// A limit on every pose; `words` describes the pose.
 template <class Words>
 GateResult pose_gate(const char* name, std::string asked, const Scenario& scenario, const BusRecord& bus,
                      const LimitMonitor<TruthState>& monitor, std::string not_judged, Words words) {
@@ -216,7 +216,7 @@ GateResult Judge::contact() const {
     std::string beyond;
     double least = std::numeric_limits<double>::infinity();
     for (const ContactCondition& c : made->conditions) {
-        // The margin of the whole gate: what is left of the narrowest condition, as a part of its range.
+        // The margin of the whole gate: the least remaining margin of all conditions, as a part of their range.
         least = std::min(
             {least, (c.max - c.value) / (c.max - c.min), c.min > 0 ? (c.value - c.min) / (c.max - c.min) : 1.0});
         if (!c.within())
@@ -240,7 +240,7 @@ GateResult Judge::contact() const {
     return gate;
 }
 
-/// Under the feet where the lander came to rest, or where the run ended.
+/// The ground under the feet where the lander came to rest, or where the run ended.
 std::optional<Footing> Judge::footing_at_end() const {
     if (!t_contact_ns_ || bus_.truth.empty()) return std::nullopt;
     const auto terrain = Terrain::create(scenario_);
@@ -248,7 +248,7 @@ std::optional<Footing> Judge::footing_at_end() const {
     return footing(**terrain, feet_at_site(scenario_.gear->feet_m, bus_.truth.back()));
 }
 
-/// A gate for each condition at touchdown, and for the ground.
+/// Adds a gate for each condition at touchdown, and for the ground.
 void Judge::add_landing_gates(Verdict& v) const {
     const LandingLimits& limits = *scenario_.gates.landing;
     if (v.contact) {

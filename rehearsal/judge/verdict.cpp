@@ -23,7 +23,7 @@ double at_least(std::size_t k, std::size_t n, double p) {
     return std::min(sum, 1.0);
 }
 
-/// Where a function that rises from below to above `level` within [0, 1] gets there.
+/// The point in [0, 1] where a rising function crosses `level`.
 template <class Function>
 double crossing(Function f, double level) {
     double low = 0, high = 1;

@@ -15,7 +15,7 @@
 
 namespace narpa::rehearsal {
 
-/// Percentiles are values that occur: the smallest that at least so many per cent do not exceed (nearest rank).
+/// Percentiles are observed values, by nearest rank: the smallest that at least so many per cent do not exceed.
 struct Distribution {
     std::size_t count = 0;
     double mean = 0, sigma = 0;  ///< sigma: of the population from this sample; 0 for fewer than two
@@ -23,8 +23,8 @@ struct Distribution {
 };
 [[nodiscard]] Distribution distribution(std::vector<double> values);
 
-/// The share of successes that `successes` of `trials` are compatible with: the exact interval of C. Clopper and
-/// E. Pearson, Biometrika 26 (1934), which holds the truth with at least `confidence`. trials > 0.
+/// Interval of the success probability compatible with `successes` of `trials`: the exact interval of C. Clopper
+/// and E. Pearson, Biometrika 26 (1934), which contains the true value with at least `confidence`. trials > 0.
 [[nodiscard]] std::pair<double, double> success_interval(std::size_t successes, std::size_t trials,
                                                          double confidence = 0.95);
 

@@ -26,7 +26,7 @@ struct MeasurementRecord {
     std::string why;  ///< empty where it was taken
     int points = 0;
     double ms = 0;
-    AnswerKind answer = AnswerKind::good;  ///< what the measurement's own pose is worth
+    AnswerKind answer = AnswerKind::good;  ///< classification of the measurement's own pose
 };
 inline constexpr std::array<std::string_view, 5> kMeasurementOutcomes{"taken", "gated", "too_late", "bad",
                                                                       "no_pose"};
@@ -44,7 +44,7 @@ struct CycleRecord {
 
 class Autopilot {
 public:
-    /// Reads the scene. Errors: of the scene, of the scenario's sensors.
+    /// Reads the scene. Errors: of the scene or of the scenario's sensors.
     static Result<std::unique_ptr<Autopilot>> create(const Scenario& scenario, std::uint64_t seed);
 
     [[nodiscard]] const Scenario& scenario() const noexcept { return scenario_; }
@@ -58,11 +58,11 @@ public:
     void take(const AttitudeReport& report);
     /// Phase of the dynamics at t_ns; before the measurements of that time.
     void take(DynamicsPhase phase, std::int64_t t_ns);
-    /// `camera`, `lidar`: indices in the scenario's lists. A frame: its bytes and mid-exposure. Returns of a turn:
-    /// their times count from t_ns, its end.
+    /// `camera`, `lidar`: indices in the scenario's lists. take_frame: the frame's bytes and mid-exposure.
+    /// take_sweep: the returns of a turn, with times relative to its end, t_ns.
     void take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes);
     void take_sweep(std::size_t lidar, std::int64_t t_ns, LidarSweep sweep);
-    /// A shot that a LiDAR reports on CAN; nothing where the scenario does not navigate by it, or it met nothing
+    /// A shot that a LiDAR reports on CAN. Ignored if the scenario does not navigate by it, or if it met nothing
     /// near the target.
     void take_beam(const LidarBeamReport& report);
     /// A measurement of any other sensor; counts as a frame.
@@ -76,7 +76,7 @@ public:
 
 private:
     Autopilot() = default;
-    /// The filter's state, from which a measurement starts.
+    /// The filter's state, as prediction for a measurement.
     [[nodiscard]] Prediction predict(std::int64_t t_ns);
     void take(const std::string& sensor, std::int64_t t_ns, const MeasurementResult& measurement,
               std::uint8_t& count);
@@ -87,7 +87,7 @@ private:
     std::vector<LidarPoseEstimator> lidars_;
     std::vector<Velocimeter> velocimeters_;
 
-    std::mutex mutex_;  ///< guards what follows
+    std::mutex mutex_;  ///< guards the members below
     std::optional<StateEstimator> estimator_;
     std::optional<Guidance> guidance_;
     std::optional<FlightControl> control_;

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/bus_link.h - the navigation's messages on CAN. Pose commands, and what ledgers repeat of
-/// them, are not read: they are the truth.
+/// rehearsal/navigation/bus_link.h - the navigation's messages on CAN. Pose commands, and the poses in ledgers, are
+/// not read: they are the truth.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace narpa::rehearsal {
 
-/// A camera has handed over a frame.
+/// A camera's report of a handed-over frame.
 struct FrameNotice {
     std::uint8_t camera = 0;  ///< index in the scene
     std::int64_t t_mid_ns = 0, t_hand_over_ns = 0;
@@ -24,12 +24,12 @@ class BusLink {
 public:
     explicit BusLink(std::unique_ptr<CanBus> bus);
 
-    /// Decodes all waiting messages; waits for the first one at most so long.
+    /// Decodes all waiting messages; waits for the first one for at most `timeout_ns`.
     void receive(std::int64_t timeout_ns);
 
     [[nodiscard]] const RemoteClock& clock() const noexcept { return clock_; }
     [[nodiscard]] const std::optional<DynamicsReport>& dynamics() const noexcept { return dynamics_; }
-    /// The newest one.
+    /// The newest report.
     [[nodiscard]] const std::optional<AttitudeReport>& attitude() const noexcept { return attitude_; }
     /// Frames handed over since the last call, in the order of the bus.
     [[nodiscard]] std::vector<FrameNotice> take_notices();
@@ -37,7 +37,7 @@ public:
     /// Shots of LiDARs on CAN that fired by t_ns, since the last call, in the order of the bus.
     [[nodiscard]] std::vector<LidarBeamReport> take_beams(std::int64_t t_ns);
 
-    /// False: dropped, in part or as a whole.
+    /// Returns false if the message was dropped, in part or as a whole.
     template <class Message>
     bool send(const Message& message);
 

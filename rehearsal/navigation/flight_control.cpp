@@ -22,14 +22,15 @@ Vec3 modulate(std::array<PulseAxis, 3>& axes, const Vec3& wanted) {
     return {axes[0].modulate(wanted.x), axes[1].modulate(wanted.y), axes[2].modulate(wanted.z)};
 }
 
-/// A pulse at the start of the period moves a body further than the same impulse spread over the period: the
-/// initial velocity is reduced by this. `steady`: mean acceleration; `most`: acceleration during the pulse.
+/// A pulse at the start of the period moves a body further than the same impulse spread over the period. Returns
+/// the velocity by which the initial velocity is reduced. `steady`: mean acceleration; `most`: acceleration during
+/// the pulse.
 Vec3 push_lag(const Vec3& steady, double most, double period_s) {
     const double on = std::min(1.0, norm(steady) / most);
     return (0.5 * (1 - on) * period_s) * steady;
 }
 
-double most_turn_rad_s(const Scenario& s, const SampledGains& gains) {
+double max_turn_rad_s(const Scenario& s, const SampledGains& gains) {
     const double least = s.thrusters.torque_n_m / s.chaser.inertia_kg_m2.diagonal().maxCoeff();
     return std::min(kDegree * s.control.turn_deg_s, kShareToStop * least / gains.velocity_s);
 }
@@ -65,7 +66,7 @@ FlightControl::FlightControl(const Scenario& s)
       attitude_(SampledGains::of(s.control.attitude_bandwidth_rad_s, s.control.damping, period_s_)),
       acceleration_most_m_s2_(s.thrusters.force_n / s.chaser.mass_kg),
       turn_acceleration_most_rad_s2_(s.thrusters.torque_n_m / s.chaser.inertia_kg_m2.diagonal().maxCoeff()),
-      turn_most_rad_s_(most_turn_rad_s(s, attitude_)),
+      turn_most_rad_s_(max_turn_rad_s(s, attitude_)),
       force_(axes(s.thrusters.force_n, s.thrusters, period_s_)),
       torque_(axes(s.thrusters.torque_n_m, s.thrusters, period_s_)) {}
 
@@ -88,10 +89,10 @@ Quat FlightControl::q_world_wanted(const RelativeMotion& m, const Reference& ref
            conjugate(chaser_.T_body_port.q);
 }
 
-/// The force is that of the engine along its axis, which turns to where it is wanted, at most so far from upright.
+/// The force is the engine's along its axis, which is rotated to the wanted direction, up to the largest tilt.
 Impulses FlightControl::step_with_engine(double t_s, const RelativeMotion& m, const Reference& reference) {
     const Quat q_world_upright = q_world_wanted(m, reference);
-    // With the lander upright: a turn that the engine needs is no reason to push its feet aside.
+    // As if upright: a rotation that the engine needs must not make the controller move the feet aside.
     RelativeMotion upright = m;
     upright.q_world_chaser = q_world_upright;
     upright.chaser_rate_rad_s = {};
@@ -117,7 +118,7 @@ Impulses FlightControl::step_with_engine(double t_s, const RelativeMotion& m, co
     return {impulse, modulate(torque_, period_s_ * torque)};
 }
 
-/// Chaser's body axes.
+/// In the chaser's body axes.
 Vec3 FlightControl::angular_acceleration(const RelativeMotion& m, const Reference& reference,
                                          const Quat& q_world_wanted) const {
     const Quat q_world_port = m.q_world_target * target_.T_body_port.q;
@@ -136,10 +137,10 @@ Vec3 FlightControl::angular_acceleration(const RelativeMotion& m, const Referenc
     return attitude_.position_s2 * error + attitude_.velocity_s * (rate - m.chaser_rate_rad_s) + steady;
 }
 
-/// Of the centre of mass by thrust, world axes.
+/// Acceleration of the centre of mass by thrust, world axes.
 Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Reference& reference,
                                  const Vec3& angular_acceleration_rad_s2) const {
-    // Reference motion of the port, from the target's centre of mass in inertial axes.
+    // Reference motion of the port about the target's centre of mass, inertial axes.
     const Rigid3 T_world_port = Rigid3{m.q_world_target, {}} * port_from_mass(target_);
     const Vec3 w = m.q_world_target * m.target_rate_rad_s;
     const Vec3 wanted = T_world_port * reference.position_m;
@@ -147,7 +148,7 @@ Vec3 FlightControl::acceleration(double t_s, const RelativeMotion& m, const Refe
     const Vec3 wanted_velocity = wanted_along + cross(w, wanted);
     const Vec3 wanted_acceleration =
         T_world_port.q * reference.acceleration_m_s2 + 2 * cross(w, wanted_along) + cross(w, cross(w, wanted));
-    // Actual motion of the port with the chaser.
+    // Actual motion of the port due to the chaser's rotation.
     const Vec3 arm = m.q_world_chaser * port_from_mass(chaser_).t;
     const Vec3 turn = m.q_world_chaser * m.chaser_rate_rad_s;
     const Vec3 by_turning =

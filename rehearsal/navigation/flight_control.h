@@ -1,6 +1,5 @@
 /// rehearsal/navigation/flight_control.h - feedback control of the chaser's port to the reference, and thrust
-/// allocation. A chaser with an engine tilts it to where the force is needed; thrusters add what is missing across
-/// it.
+/// allocation. A chaser with an engine tilts it to the direction of the force; thrusters add the rest across it.
 #pragma once
 
 #include <array>
@@ -39,11 +38,11 @@ class FlightControl {
 public:
     explicit FlightControl(const Scenario& scenario);
 
-    /// For one period from t_s on. Controls the port's position through the centre of mass, with the port's motion
-    /// from the chaser's rotation compensated. Feeds forward gravity and the acceleration of the rotating port
-    /// axes.
+    /// Impulses for one period from t_s on. Controls the port's position through the centre of mass, and
+    /// compensates the port's motion due to the chaser's rotation. Feeds forward gravity and the acceleration of
+    /// the rotating port axes.
     [[nodiscard]] Impulses step(double t_s, const RelativeMotion& motion, const Reference& reference);
-    /// Of the chaser, which changes where an engine burns propellant.
+    /// Mass of the chaser, which decreases as an engine burns propellant.
     void set_mass(double mass_kg) noexcept { chaser_.mass_kg = mass_kg; }
     /// Clears the accumulated impulses.
     void reset() noexcept;

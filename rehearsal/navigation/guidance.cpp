@@ -91,11 +91,11 @@ Vec3 DescentPath::acceleration_m_s2(double t_s) const {
 
 namespace {
 
-/// A descent is planned anew from each estimate until so long before its end; then it is followed.
+/// A descent is replanned from each estimate until this long before its end; then the last plan is followed.
 constexpr double kPlanned_s = 12;
 
-/// Shares of the thrusters' acceleration that the reference uses; the rest is left to the controller. A retreat
-/// must stop before the port.
+/// Shares of the thrusters' acceleration that the reference uses; the rest is left to the controller. A retreat has
+/// a larger share, as it must stop before the port.
 constexpr double kShareOfThrust = 0.2, kShareToRetreat = 0.6;
 /// Half step of the central difference for the reference's angular rate.
 constexpr double kRateStep_s = 0.05;
@@ -105,12 +105,12 @@ Quat looking_at_origin(const Vec3& position_m) {
     if (norm(position_m) < 1e-6) return T_port_docked().q;
     const Vec3 x = -normalized(position_m);
     Vec3 y = cross(Vec3{0, 0, 1}, x);
-    if (norm(y) < 1e-6) y = {0, -1, 0};  // along z: as it is docked
+    if (norm(y) < 1e-6) y = {0, -1, 0};  // along z: the docked attitude
     y = normalized(y);
     return quat_from_columns(x, y, cross(x, y));
 }
 
-/// Over a way that begins at rest and ends at `speed_m_s` or before.
+/// Duration of a path that starts at rest and accelerates up to `speed_m_s`.
 double from_rest_s(double way_m, double speed_m_s, double acceleration_m_s2) {
     const double faster_m = 0.5 * speed_m_s * speed_m_s / acceleration_m_s2;
     if (way_m < faster_m) return std::sqrt(2 * way_m / acceleration_m_s2);
@@ -187,7 +187,7 @@ void Guidance::step(const GuidanceInput& input) {
 AbortReason Guidance::reason_to_abort(const GuidanceInput& input) const {
     if (input.unmeasured_s > limits_.abort_lost_s) return AbortReason::lost;
     if (!(input.position_sigma_m <= limits_.abort_sigma_m)) return AbortReason::uncertain;
-    if (descends()) return AbortReason::none;  // planned from where it is
+    if (descends()) return AbortReason::none;  // the plan starts at the estimate
     if (!(norm(input.port_m - path_.position_m(input.t_s - leg_from_s_)) <= limits_.abort_off_m))
         return AbortReason::off_reference;
     return AbortReason::none;
@@ -207,7 +207,7 @@ void Guidance::retreat(const GuidanceInput& input, AbortReason reason) {
     abort_ = reason;
 }
 
-/// From the estimate, while its noise divided by the time to go is small.
+/// Plans from the estimate, while its noise divided by the time to go is small.
 void Guidance::plan_descent(const GuidanceInput& input) {
     const Leg& leg = legs_[leg_];
     const double left_s = to_go_s(input.t_s);

@@ -10,13 +10,14 @@
 
 namespace narpa::rehearsal {
 
-/// A straight line or an arc about the origin, with a trapezoidal speed profile (triangular where it is short).
-/// Times count from its start; before and after, the position is that of its ends.
+/// A straight line or an arc about the origin, with a trapezoidal speed profile (triangular if it is short). Times
+/// count from its start; before and after, the position is that of the nearer end.
 class LegPath {
 public:
-    /// A leg to contact continues in its direction without end.
+    /// A leg to contact has no end.
     static LegPath along(const Leg& leg, const Vec3& from_m, double acceleration_m_s2);
-    /// Without end; the speed changes uniformly from `first_m_s`, which may be negative, to `speed_m_s`.
+    /// A straight path without end; the speed changes uniformly from `first_m_s`, which may be negative, to
+    /// `speed_m_s`.
     static LegPath away(const Vec3& from_m, const Vec3& direction, double first_m_s, double speed_m_s,
                         double acceleration_m_s2);
 
@@ -41,7 +42,7 @@ private:
     double first_m_s_ = 0, speed_m_s_ = 0, acceleration_m_s2_ = 1;
 };
 
-/// Powered descent: the polynomial of fourth order from a position and velocity to a position, a velocity and no
+/// Powered descent: the fourth-order polynomial from a position and velocity to a position, a velocity and zero
 /// acceleration after a given time (the quadratic guidance of A. Klumpp, "Apollo lunar descent guidance",
 /// Automatica 10, 1974).
 class DescentPath {
@@ -50,7 +51,7 @@ public:
     /// `to_go_s` > 0. Times count from the end, and are negative before.
     DescentPath(const Vec3& from_m, const Vec3& from_m_s, const Vec3& to_m, const Vec3& to_m_s, double to_go_s);
 
-    /// After the end, steadily on.
+    /// After the end: constant velocity.
     [[nodiscard]] Vec3 position_m(double t_s) const;
     [[nodiscard]] Vec3 velocity_m_s(double t_s) const;
     [[nodiscard]] Vec3 acceleration_m_s2(double t_s) const;
@@ -64,7 +65,7 @@ struct Reference {
     Vec3 position_m{}, velocity_m_s{};
     Quat q_port_chaser_port{};
     Vec3 rate_rad_s{};  ///< of the chaser's port axes against the target's
-    /// Means over the control period that follows.
+    /// Means over the following control period.
     Vec3 acceleration_m_s2{}, angular_acceleration_rad_s2{};
 };
 
@@ -81,14 +82,14 @@ public:
     /// Legs begin at t_s from the nominal start.
     Guidance(const Scenario& scenario, double t_s);
 
-    /// Once each control period: switches legs, plans a descent anew, aborts, ends at capture or touchdown. A
-    /// contact without capture is a reason to retreat.
+    /// Call once each control period: switches legs, replans a descent, aborts, ends at capture or touchdown. A
+    /// contact without capture starts a retreat.
     void step(const GuidanceInput& input);
 
     [[nodiscard]] GuidancePhase phase() const noexcept { return phase_; }
     [[nodiscard]] std::size_t leg() const noexcept { return leg_; }
     [[nodiscard]] AbortReason abort() const noexcept { return abort_; }
-    /// After capture or touchdown.
+    /// True after capture or touchdown.
     [[nodiscard]] bool thrusters_off() const noexcept {
         return phase_ == GuidancePhase::docked || phase_ == GuidancePhase::landed;
     }

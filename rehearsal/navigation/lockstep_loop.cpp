@@ -45,7 +45,7 @@ private:
             if (auto read = read_frames(); !read) return read;
             read_packets();
             if (met() || loop_.over()) break;
-            if (loop_.link.dynamics() && loop_.link.clock().stopping())  // else of an earlier run
+            if (loop_.link.dynamics() && loop_.link.clock().stopping())  // otherwise it is from an earlier run
                 return loop_.failed(fmt::format("the emulator has stopped, expected {}", what));
             if (loop_.link.counters().interface_down > 0)
                 return loop_.failed(fmt::format("the connection to the emulator was lost, expected {}", what));
@@ -57,7 +57,7 @@ private:
         return Ok{};
     }
 
-    /// Reads every announced frame at once: the emulator waits for room in the FIFO.
+    /// Reads all announced frames immediately: the emulator blocks until the FIFO has room.
     Status read_frames() {
         for (const FrameNotice& notice : loop_.link.take_notices()) {
             if (notice.delivery == Delivery::nothing) continue;

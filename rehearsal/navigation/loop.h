@@ -1,4 +1,4 @@
-/// rehearsal/navigation/loop.h - what the lockstep and the real-time loop have in common.
+/// rehearsal/navigation/loop.h - shared parts of the lockstep and the real-time loop.
 #pragma once
 
 #include "base/stop.h"
@@ -30,7 +30,7 @@ struct Loop {
         if (log) log->frame(autopilot.model().scene().cameras[inputs.cameras[i].camera], bytes);
         autopilot.take_frame(i, t_mid_ns, bytes);
     }
-    /// Those that have come over CAN and fired by t_ns.
+    /// Takes the shots that were received over CAN and fired by t_ns.
     void take_beams(std::int64_t t_ns) const {
         for (const LidarBeamReport& beam : link.take_beams(t_ns)) autopilot.take_beam(beam);
     }
@@ -43,12 +43,12 @@ struct Loop {
     }
 };
 
-/// On simulation time alone. Errors: no messages on the bus for too long, an emulator that has stopped, a lost
+/// Uses simulation time only. Errors: no messages on the bus for too long, an emulator that has stopped, a lost
 /// connection to the bus, a video source that has failed.
 Status fly_in_lockstep(const Loop& loop);
 
-/// On the emulator's clock. The calling thread receives from the bus and runs a cycle each period. Each source has
-/// a thread that reads it. One more thread measures: once the chaser's attitude at t_k has come, from the newest
+/// Uses the emulator's clock. The calling thread receives from the bus and runs a cycle each period. Each source
+/// has a reader thread. One more thread measures: when the chaser's attitude at t_k has arrived, it uses the newest
 /// frame of each camera and the newest sweep of each LiDAR that end by t_k. Errors: no heartbeat, at the start or
 /// for too long, an emulator that has stopped.
 Status fly_in_real_time(const Loop& loop);

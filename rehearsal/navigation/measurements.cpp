@@ -17,22 +17,22 @@ FeatureSettings feature_settings(std::uint64_t seed, const ModelUncertainty& mod
     f.model = model;
     f.seed = seed;
     f.renders_max = 4;
-    f.settled_px = 0.1;  // the filter's prediction is usually so near that one render is enough
+    f.settled_px = 0.1;  // the filter's prediction is usually so close that one render is enough
     return f;
 }
 
 /// Factor on the estimator's covariance: consecutive frames show the same details in nearly the same pixels, so
-/// their errors are correlated (0.2 to 0.3 from one second to the next between 18 and 3 m), and the filter takes
-/// them for independent.
+/// their errors are correlated (0.2 to 0.3 from one second to the next between 18 and 3 m), while the filter
+/// assumes independent errors.
 constexpr double kMatchVariance = 2.5;
 /// Radius of the search around the prediction, in standard deviations.
 constexpr double kSearchSigmas = 4;
-/// No search where the prediction is this good: a search costs much more than an alignment.
+/// No search if the prediction is this good, as a search costs much more than an alignment.
 constexpr double kNear_m = 0.3;
-/// Pixels of a level that its steps reach over.
+/// Initial error, in pixels of a pyramid level, from which that level converges.
 constexpr double kDenseReach_px = 1;
 
-/// Sensor pixels, each way, in a pixel of the coarsest level that dense steps need from a prediction.
+/// Factor (sensor pixels per pixel, each way) of the coarsest level that dense alignment needs from a prediction.
 int coarsest_level(const Prediction& predicted, const Camera& camera, double range_m, double reach_m, int most) {
     const double off_m = kSearchSigmas * (predicted.position_sigma_m + predicted.rotation_sigma_rad * reach_m);
     const double off_px = CameraModelHandle(camera)->pixels_per_radian() * off_m / range_m;
@@ -47,7 +47,7 @@ CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, 
                                          std::uint64_t seed)
     : model_(model),
       camera_(model.scene().cameras[camera]),
-      seed_(~seed) {  // not the random numbers of the frames, whose seed may be the same
+      seed_(~seed) {  // differs from the seed of the frames' random numbers
     if (method == CameraMethod::dense)
         pixels_.emplace(model.render_scene(), camera_, model.target());
     else
@@ -97,7 +97,7 @@ void CameraPoseEstimator::by_features(const MeasuredImage& image, const BodyPose
         out.pose->root_information = e.answer.root_information / std::sqrt(kMatchVariance);
 }
 
-/// The light is known in the camera's axes, by the chaser's attitude.
+/// The light is known in camera axes, from the chaser's attitude.
 void CameraPoseEstimator::by_pixels(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
                                     MeasurementResult& out) {
     const Scene& scene = model_.scene();
@@ -127,7 +127,7 @@ void CameraPoseEstimator::by_pixels(const MeasuredImage& image, const BodyPoses&
                 .covariance_of_model = e->covariance_of_model};
 }
 
-/// Drops the beams that meet the chaser itself.
+/// Removes the beams that hit the chaser itself.
 void LidarPoseEstimator::remove_own_body(LidarSweep& sweep) const {
     BodyPoses at(model_->scene().bodies.size());
     const auto own = static_cast<std::uint32_t>(model_->chaser());
@@ -167,7 +167,7 @@ MeasurementResult LidarPoseEstimator::measure(LidarSweep sweep, std::int64_t t_n
     const Rigid3 guess = inverse(lidar_.T_mount_lidar) * predicted.T_chaser_target;
     const double reach_m = model_->tracer().bounding_radius_m(model_->target());
     const double off_m = kSearchSigmas * (predicted.position_sigma_m + predicted.rotation_sigma_rad * reach_m);
-    // Of the beams without return most pass the target far off.
+    // Most beams without return pass far from the target.
     std::erase_if(sweep.empty, [&](const EmptyBeam& b) {
         const Vec3 to_target = guess.t + b.t_s * in_lidar.velocity_m_s - b.origin_m;
         const double along = dot(to_target, b.direction);

@@ -13,7 +13,7 @@
 
 namespace narpa::rehearsal {
 
-/// What is known of the target before a measurement, from the filter; body axes of the chaser.
+/// The filter's prediction of the target before a measurement; body axes of the chaser.
 struct Prediction {
     double t_s = 0;  ///< after the scenario's time 0
     Quat q_world_chaser{};
@@ -22,7 +22,7 @@ struct Prediction {
     double position_sigma_m = 0, rotation_sigma_rad = 0;
 };
 
-/// The pose; or none, and why, where no reliable one was found.
+/// A pose; or none and the reason, if no reliable one was found.
 struct MeasurementResult {
     std::optional<TargetMeasurement> pose;
     AnswerKind answer = AnswerKind::refused;
@@ -54,11 +54,11 @@ private:
     SceneModel& model_;
     Camera camera_;
     std::uint64_t seed_;
-    std::optional<FeatureAlignment> features_;  ///< one of them
+    std::optional<FeatureAlignment> features_;  ///< exactly one of the two is set
     std::optional<DenseAlignment> pixels_;
 };
 
-/// Sweeps of one LiDAR: ICP of the last turn's returns, corrected for the motion to the time of its end.
+/// Sweeps of one LiDAR: ICP of the last turn's returns, corrected for motion to the end of the turn.
 class LidarPoseEstimator {
 public:
     /// `model` outlives it. `lidar`: index in the scene.

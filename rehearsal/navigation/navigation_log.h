@@ -1,6 +1,6 @@
-/// rehearsal/navigation/navigation_log.h - the files that the navigation writes: navigation.csv (a line a control
-/// period), measurements.csv (a line a frame or sweep), camera pictures at the start of each hold and at contact,
-/// navigation.json (counts). Frames may come from another thread than the rest.
+/// rehearsal/navigation/navigation_log.h - output files of the navigation: navigation.csv (a line per control
+/// period), measurements.csv (a line per frame or sweep), camera pictures at the start of each hold and at contact,
+/// navigation.json (counts). frame() may be called from another thread than the rest.
 #pragma once
 
 #include <cstdint>
@@ -26,10 +26,10 @@ struct NodeCounts {
 
 class NavigationLog {
 public:
-    /// Makes the folder. Errors: it cannot be written to.
+    /// Creates the folder. Errors: it cannot be written to.
     static Result<std::unique_ptr<NavigationLog>> create(const std::string& folder, const Scenario& scenario);
 
-    /// The newest frame of this camera.
+    /// Keeps the newest frame of this camera.
     void frame(const Camera& camera, std::span<const std::uint8_t> bytes);
     void cycle(const CycleRecord& record);
     Status finish(const NodeCounts& counts, std::uint64_t restarts, const std::string& version);

@@ -1,8 +1,8 @@
 /// rehearsal/navigation/node.h - the navigation as a program: frames and packets in, CAN in and out.
 ///
 /// In lockstep each control cycle waits for the emulator's clock and for every frame and packet that is due;
-/// nothing depends on wall time. In real time the cycle runs on the emulator's clock; a thread of its own measures
-/// from the newest frames and sweeps.
+/// nothing depends on wall time. In real time the cycle runs on the emulator's clock, and a separate thread
+/// measures from the newest frames and sweeps.
 #pragma once
 
 #include <cstdint>

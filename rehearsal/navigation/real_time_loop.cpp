@@ -21,21 +21,22 @@ namespace narpa::rehearsal {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
-constexpr std::int64_t kPatience_ns = 60 * kSecond_ns;  ///< for the first heartbeat and report
-/// Delays allowed after t_k: of its attitude report, of frames and packets that end at t_k.
+constexpr std::int64_t kTimeout_ns = 60 * kSecond_ns;  ///< for the first heartbeat and report
+/// Longest delays after t_k: of its attitude report, and of frames and packets that end at t_k.
 constexpr std::int64_t kReportWait_ns = 50 * kMs, kSensorWait_ns = 60 * kMs;
-/// A command acts so long after t_k: by then it has arrived, so that its thrust is the one that the filter takes.
+/// A command takes effect this long after t_k: by then it has arrived, so the actual thrust is that known to the
+/// filter.
 constexpr std::int64_t kCommandLead_ns = 60 * kMs;
 constexpr int kCyclePriority = 50;  ///< below the emulator's CAN thread
 
 constexpr std::int64_t kReadWait_ns = 50'000'000;
 constexpr std::size_t kFramesKept = 4, kNoticesKept = 16;
 
-/// Reads the sources, one thread each, keeps the newest frames and packets, and finds the exposure time of each
-/// frame.
+/// Reads the sources, one thread each, keeps the newest frames and packets, and determines each frame's exposure
+/// time.
 class SensorReceiver {
 public:
-    /// Both outlive it.
+    /// Both references outlive it.
     SensorReceiver(SensorInputs& inputs, const SceneModel& model)
         : inputs_(inputs), model_(model), cameras_(inputs.cameras.size()) {
         for (std::size_t i = 0; i < inputs.cameras.size(); ++i)
@@ -67,8 +68,8 @@ public:
         std::int64_t t_mid_ns = 0;
         std::vector<std::uint8_t> bytes;
     };
-    /// The newest frame exposed at t_ns or before, unless it was returned before. `camera`: in the scenario's
-    /// order.
+    /// The newest frame exposed at or before t_ns, unless returned before. `i`: index of the camera in the
+    /// scenario.
     [[nodiscard]] std::optional<Frame> newest_frame(std::size_t i, std::int64_t t_ns) {
         const std::lock_guard lock(mutex_);
         CameraState& state = cameras_[i];
@@ -82,7 +83,7 @@ public:
         }
         return std::nullopt;
     }
-    /// The turn that ends at t_ns; false: its last packet has not come.
+    /// The turn that ends at t_ns; false: its last packet has not arrived.
     [[nodiscard]] bool turn(std::size_t i, std::int64_t t_ns, LidarSweep& out) {
         const std::lock_guard lock(mutex_);
         const SweepBuffer& buffer = inputs_.lidars[i].buffer;
@@ -136,10 +137,10 @@ private:
             return ledger ? std::optional(ledger->t_exposure_mid_ns) : std::nullopt;
         }
         const FrameNotice* nearest = nullptr;
-        std::int64_t least_ns = camera.period_ns / 2;
+        std::int64_t min_ns = camera.period_ns / 2;
         for (const FrameNotice& notice : state.notices) {
             const std::int64_t off_ns = std::abs(frame.t_arrived_ns + offset_ns_ - notice.t_hand_over_ns);
-            if (off_ns < least_ns) nearest = &notice, least_ns = off_ns;
+            if (off_ns < min_ns) nearest = &notice, min_ns = off_ns;
         }
         std::optional<std::int64_t> mid_ns;
         if (nearest && nearest->delivery == Delivery::frame) mid_ns = nearest->t_mid_ns;
@@ -149,7 +150,7 @@ private:
     SensorInputs& inputs_;
     const SceneModel& model_;
     StopFlag stop_{false};
-    mutable std::mutex mutex_;  ///< guards what follows and the LiDARs' buffers
+    mutable std::mutex mutex_;  ///< guards the members below and the LiDARs' buffers
     std::vector<CameraState> cameras_;
     std::int64_t offset_ns_ = 0;
     std::uint64_t frames_ = 0;
@@ -186,7 +187,7 @@ private:
     }
 
     Status wait_for_the_start() {
-        const std::int64_t deadline = monotonic_ns() + kPatience_ns;
+        const std::int64_t deadline = monotonic_ns() + kTimeout_ns;
         while (!loop_.over()) {
             receive(20 * kMs);
             if (loop_.link.clock().synchronized() && loop_.link.dynamics() && loop_.link.attitude()) return Ok{};
@@ -194,13 +195,13 @@ private:
                 return loop_.failed(
                     fmt::format("{} in {} s: are `narpa run` and the dynamics there?",
                                 loop_.link.clock().synchronized() ? "no report of the dynamics" : "no heartbeat",
-                                kPatience_ns / kSecond_ns));
+                                kTimeout_ns / kSecond_ns));
         }
         return Ok{};
     }
 
     Status run_cycles() {
-        take_fifo_priority(kCyclePriority);  // this thread alone: the measuring one computes for long
+        take_fifo_priority(kCyclePriority);  // this thread alone: the measuring thread computes for long
         for (std::int64_t t_ns = t_start_ns_;; t_ns += period_ns_) {
             if (auto there = wait_until(t_ns); !there || loop_.over()) return there;
             const std::int64_t late_ns = loop_.link.clock().now_ns() - t_ns;
@@ -216,7 +217,8 @@ private:
         }
     }
 
-    /// Until the clock shows t_ns and the attitude of that time has come, or kReportWait_ns longer.
+    /// Waits until the clock shows t_ns and the attitude of that time has arrived, for at most kReportWait_ns
+    /// longer.
     Status wait_until(std::int64_t t_ns) {
         while (!loop_.over()) {
             const std::int64_t left_ns = t_ns - loop_.link.clock().now_ns();
@@ -230,7 +232,7 @@ private:
 
     Status emulator_is_there() const {
         const RemoteClock& clock = loop_.link.clock();
-        if (loop_.over()) return Ok{};  // it may end then
+        if (loop_.over()) return Ok{};  // the run may end here
         if (clock.stopping()) return loop_.failed("the emulator has stopped before the dynamics reported the end");
         if (static_cast<double>(clock.silence_ns()) > 1e9 * loop_.silence_s)
             return loop_.failed(fmt::format("no heartbeat of the emulator for {:g} s", loop_.silence_s));
@@ -252,7 +254,7 @@ private:
         return attitude.t_ns;
     }
 
-    /// The measuring thread.
+    /// Body of the measuring thread.
     void measure() {
         const SingleThreadedOpenCv pictures;
         tbb::task_arena arena;

@@ -8,7 +8,7 @@
 
 namespace narpa::rehearsal {
 
-/// The chaser relative to the target's centre of mass, which is at rest; world axes.
+/// The chaser relative to the target's centre of mass, taken as at rest; world axes.
 struct RelativeMotion {
     Vec3 position_m{}, velocity_m_s{};  ///< of the chaser's centre of mass, inertial
     Quat q_world_target{}, q_world_chaser{};
@@ -21,7 +21,7 @@ struct RelativeMotion {
 /// The filter's state (motion_model.h; frame LVLH, inertial where the model is free) in inertial axes at t_s.
 [[nodiscard]] RelativeMotion in_world(const RelativeState& state, const Orbit& orbit, double t_s,
                                       const Quat& q_world_chaser, const Vec3& chaser_rate_rad_s);
-/// Its inverse.
+/// Inverse of in_world().
 [[nodiscard]] RelativeState in_frame(const RelativeMotion& motion, const Orbit& orbit, double t_s);
 
 [[nodiscard]] PortState port_state(const RelativeMotion& motion, const Vehicle& target, const Vehicle& chaser);
@@ -33,11 +33,11 @@ void place_port(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vehicle
 /// The target's rate at time 0, against inertial space, body axes.
 [[nodiscard]] Vec3 nominal_target_rate_rad_s(const Scenario& scenario);
 
-/// Surface: what the chaser falls in, for the filter; of the point mass linear about the target.
+/// Surface model: gravity field for the filter's chaser, that of the point mass linearised about the target.
 [[nodiscard]] GroundField ground_field(const Orbit& orbit);
 
-/// Acceleration of the chaser by gravity minus that of the target, inertial axes: linear about the target's
-/// circular orbit; over ground exact.
+/// Acceleration of the chaser by gravity minus that of the target, inertial axes: linearised about the target's
+/// circular orbit; exact over ground.
 [[nodiscard]] Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m);
 
 }  // namespace narpa::rehearsal

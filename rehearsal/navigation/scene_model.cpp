@@ -8,8 +8,8 @@
 namespace narpa::rehearsal {
 namespace {
 
-/// Changes the scene to what the navigation believes.
-void believe(const ModelUncertainty& e, std::size_t target, Scene& scene) {
+/// Applies the navigation's model errors to the scene.
+void apply_model_error(const ModelUncertainty& e, std::size_t target, Scene& scene) {
     if (e == ModelUncertainty{}) return;
     const Vec3 along = normalized(Vec3{1, 1, 1});
     if (const int* mesh = std::get_if<int>(&scene.bodies[target].shape))
@@ -19,7 +19,7 @@ void believe(const ModelUncertainty& e, std::size_t target, Scene& scene) {
     if (scene.sun) scene.sun->direction = exp_rotation(e.light_rad * along) * scene.sun->direction;
     const Quat turn = exp_rotation(e.boresight_rad * along);
     for (Camera& c : scene.cameras) {
-        c.fx *= 1 + e.focal, c.fy *= 1 + e.focal;  // of pinholes; a calibrated lens keeps its own
+        c.fx *= 1 + e.focal, c.fy *= 1 + e.focal;  // pinholes only; a calibrated lens is unchanged
         c.T_mount_camera.q = c.T_mount_camera.q * turn;
     }
     for (Lidar& l : scene.lidars) l.T_mount_lidar.q = l.T_mount_lidar.q * turn;
@@ -34,7 +34,7 @@ Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario)
     m->scene_ = *std::move(scene);
     m->orbit_ = scenario.orbit;
     m->target_centre_of_mass_m_ = scenario.target.centre_of_mass_m;
-    // read_scenario has found all of them in the scene, and the same names in the navigation's.
+    // read_scenario has checked that all of these are in the scene, and in the navigation's scene.
     const auto index_of = [](const auto& all, const std::string& name) {
         const auto has_name = [&](const auto& named) { return named.name == name; };
         return static_cast<std::size_t>(std::ranges::find_if(all, has_name) - all.begin());
@@ -49,7 +49,7 @@ Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario)
     for (const std::string& name : scenario.navigation.velocimeters)
         m->velocimeters_.push_back(index_of(m->scene_.lidars, name));
     m->uncertainty_ = scenario.model_error.uncertainty();
-    believe(scenario.model_error.error, m->target_, m->scene_);
+    apply_model_error(scenario.model_error.error, m->target_, m->scene_);
     auto render_scene = RenderScene::create(m->scene_);
     if (!render_scene) return render_scene.error();
     m->render_scene_.emplace(*std::move(render_scene));

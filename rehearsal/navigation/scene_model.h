@@ -1,5 +1,5 @@
-/// rehearsal/navigation/scene_model.h - the scene as the navigation's model of what its sensors see, with the
-/// target at its estimated pose.
+/// rehearsal/navigation/scene_model.h - the navigation's model of what its sensors see: the scene with the target
+/// at its estimated pose.
 #pragma once
 
 #include <memory>
@@ -13,8 +13,8 @@ namespace narpa::rehearsal {
 
 class SceneModel {
 public:
-    /// Reads the scenario's scene, or that of its [navigation], with the errors of its `model_error`, and builds
-    /// its tracer. Errors: of the scene.
+    /// Reads the scenario's scene, or that of its [navigation], applies its `model_error`, and builds the tracer.
+    /// Errors: of the scene.
     static Result<std::unique_ptr<SceneModel>> create(const Scenario& scenario);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
@@ -27,7 +27,7 @@ public:
     [[nodiscard]] const std::vector<std::size_t>& lidars() const noexcept { return lidars_; }
     [[nodiscard]] const std::vector<std::size_t>& velocimeters() const noexcept { return velocimeters_; }
 
-    /// What the navigation is told of its model's errors.
+    /// Model uncertainty as stated to the navigation.
     [[nodiscard]] const ModelUncertainty& uncertainty() const noexcept { return uncertainty_; }
 
     /// Poses at t_s: the target's centre of mass at the world's origin, the attractor at the orbit's radius below

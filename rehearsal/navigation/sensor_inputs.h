@@ -23,12 +23,12 @@ public:
     /// `epoch_unix_ns`: UTC of simulation time 0.
     SweepBuffer(const Lidar& lidar, std::int64_t epoch_unix_ns);
 
-    /// Keeps a datagram; `reference_ns`: simulation time within half an hour of it. False, and counted, where it is
-    /// no data packet of the LiDAR's model.
+    /// Keeps a datagram; `reference_ns`: simulation time within half an hour of it. False, and counted as bad, if
+    /// it is no data packet of the LiDAR's model.
     bool take(std::span<const std::uint8_t> bytes, std::int64_t reference_ns);
-    /// No packet that is complete by t_ns is missing at the end.
+    /// True if no packet that is complete by t_ns is missing at the end.
     [[nodiscard]] bool complete_to(std::int64_t t_ns) const noexcept;
-    /// The turn that ends at t_ns, of complete packets in the order of arrival; times count from t_ns.
+    /// The turn that ends at t_ns, from complete packets in order of arrival; times count from t_ns.
     void turn(std::int64_t t_ns, LidarSweep& out) const;
 
     [[nodiscard]] std::uint64_t received() const noexcept { return received_; }

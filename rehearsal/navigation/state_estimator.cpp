@@ -47,20 +47,20 @@ bool AttitudeTrack::has(std::int64_t t_ns) const noexcept {
 
 namespace {
 
-/// A minute of measurements and pulse edges.
+/// Covers a minute of measurements and pulse edges.
 constexpr std::size_t kHistory = 256;
 constexpr std::uint64_t kContradictions = 5;
 /// Standard deviations of velocity and rate when the filter restarts.
 constexpr double kRestartVelocity_m_s = 0.2, kRestartRate_rad_s = 0.2 * kDegree;
-/// Standard deviations that contact adds.
+/// Standard deviations added at contact.
 constexpr double kMetPosition_m = 0.05, kMetAttitude_rad = 0.3 * kDegree, kMetRate_rad_s = 0.1 * kDegree,
                  kHeldVelocity_m_s = 0.01, kBouncedVelocity_m_s = 0.2;
-constexpr double kGravity0_m_s2 = 9.80665;  ///< by which specific impulses are given
+constexpr double kGravity0_m_s2 = 9.80665;  ///< standard gravity, for specific impulses
 /// Lower bounds of the standard deviations at the start.
-constexpr double kLeastPosition_m = 0.01, kLeastVelocity_m_s = 1e-3, kLeastAttitude_rad = 0.1 * kDegree,
-                 kLeastRate_rad_s = 2e-3 * kDegree;
+constexpr double kMinPosition_m = 0.01, kMinVelocity_m_s = 1e-3, kMinAttitude_rad = 0.1 * kDegree,
+                 kMinRate_rad_s = 2e-3 * kDegree;
 
-/// Of the map, to the stars; of the planet's rotation.
+/// Standard deviations of the map's attitude relative to the stars, and of the planet's rotation rate.
 constexpr double kGroundAttitude_rad = 1e-5, kGroundRate_rad_s = 1e-9;
 
 /// A star tracker's error rotates the target about the chaser.
@@ -70,13 +70,13 @@ Eigen::Matrix<double, 6, 3> star_tracker_jacobian(const Vec3& target_from_chaser
     return J;
 }
 
-/// Covariance of a pose from it.
+/// Covariance of a pose due to that error.
 Matrix6 star_tracker_covariance(const Vec3& target_from_chaser_m, double sigma_rad) {
     const auto J = star_tracker_jacobian(target_from_chaser_m);
     return sigma_rad * sigma_rad * J * J.transpose();
 }
 
-/// The same of the filter's state, if it were measured at once.
+/// The same Jacobian for the filter's state, as if it were measured directly.
 Eigen::Matrix<double, 12, 3> star_tracker_jacobian(const RelativeState& state, const Quat& q_frame_chaser) {
     Eigen::Matrix<double, 12, 3> J = Eigen::Matrix<double, 12, 3>::Zero();
     const Eigen::Matrix3d R = rotation_matrix(q_frame_chaser);
@@ -85,7 +85,7 @@ Eigen::Matrix<double, 12, 3> star_tracker_jacobian(const RelativeState& state, c
     return J;
 }
 
-/// Covariance of deviations, at least `least` each, along axes rotated by q.
+/// Covariance of independent errors with standard deviations of at least `least`, along axes rotated by q.
 Eigen::Matrix3d spread(const Quat& q, const Vec3& sigma, double least) {
     Eigen::Vector3d variance;
     for (int i = 0; i < 3; ++i) variance[i] = std::pow(std::max(sigma[i], least), 2);
@@ -109,17 +109,17 @@ Matrix12 first_covariance(const Scenario& s, const RelativeMotion& motion) {
     const Quat q_target_chaser_port =
         conjugate(motion.q_world_target) * motion.q_world_chaser * s.chaser.T_body_port.q;
     Matrix12 P = Matrix12::Zero();
-    P.block<3, 3>(0, 0) = spread(q_frame_port, s.start.position_sigma_m, kLeastPosition_m);
-    P.block<3, 3>(3, 3) = spread(q_frame_port, s.start.velocity_sigma_m_s, kLeastVelocity_m_s);
+    P.block<3, 3>(0, 0) = spread(q_frame_port, s.start.position_sigma_m, kMinPosition_m);
+    P.block<3, 3>(3, 3) = spread(q_frame_port, s.start.velocity_sigma_m_s, kMinVelocity_m_s);
     if (s.orbit.model ==
-        Orbit::Model::surface) {  // how the planet turns is known; the chaser's attitude is measured
+        Orbit::Model::surface) {  // the planet's rotation is known; the chaser's attitude is measured
         P.block<3, 3>(6, 6) = kGroundAttitude_rad * kGroundAttitude_rad * Eigen::Matrix3d::Identity();
         P.block<3, 3>(9, 9) = kGroundRate_rad_s * kGroundRate_rad_s * Eigen::Matrix3d::Identity();
         return 0.5 * (P + P.transpose());
     }
-    P.block<3, 3>(6, 6) = spread(q_target_chaser_port, kDegree * s.start.attitude_sigma_deg, kLeastAttitude_rad);
+    P.block<3, 3>(6, 6) = spread(q_target_chaser_port, kDegree * s.start.attitude_sigma_deg, kMinAttitude_rad);
     P.block<3, 3>(9, 9) = spread(conjugate(motion.q_world_target) * motion.q_world_chaser,
-                                 kDegree * s.start.rate_sigma_deg_s, kLeastRate_rad_s);
+                                 kDegree * s.start.rate_sigma_deg_s, kMinRate_rad_s);
     return 0.5 * (P + P.transpose());
 }
 
@@ -174,13 +174,13 @@ void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {
     const Thrusters& thrusters = scenario_.thrusters;
     const std::optional<Engine>& engine = scenario_.engine;
     const double sigma = std::hypot(thrusters.gain_sigma, kDegree * thrusters.misalignment_sigma_deg);
-    // An engine burns for the whole period, in which the chaser may turn: its attitude in the middle is the mean.
+    // An engine burns for the whole period, during which the chaser may rotate: uses its attitude at mid-period.
     const std::int64_t period_ns = scenario_.period_ns();
     const Quat q = q_frame_chaser(engine ? t_ns + period_ns / 2 : t_ns);
     const auto burns = [&](int axis) { return engine && axis == engine->axis() && impulse_n_s[axis] != 0; };
     const double engine_sigma =
         engine ? std::hypot(engine->gain_sigma, kDegree * thrusters.misalignment_sigma_deg) : 0;
-    // The axes' pulses end one after another; the force is constant between two of these times.
+    // The pulses of the three axes end at different times; the force is constant between two of these.
     std::array<std::int64_t, 4> edges{t_ns, t_ns, t_ns, t_ns};
     for (int i = 0; i < 3; ++i)
         edges[static_cast<std::size_t>(i + 1)] +=
@@ -193,7 +193,7 @@ void StateEstimator::thrust(std::int64_t t_ns, const Vec3& impulse_n_s) {
             if (from_ns < ends[static_cast<std::size_t>(i + 1)])
                 force[i] = burns(i) ? 1e9 * impulse_n_s[i] / static_cast<double>(period_ns)
                                     : std::copysign(thrusters.force_n, impulse_n_s[i]);
-        // A pulse of on-time T and error s dv spreads the velocity by (s dv)^2 = psd T.
+        // A pulse of on-time T and relative error s spreads the velocity by (s dv)^2 = psd T.
         double error2 = 0;
         for (int i = 0; i < 3; ++i)
             if (force[i] != 0) {
@@ -233,7 +233,7 @@ void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
         Eigen::Vector3d::Constant(held ? kHeldVelocity_m_s : kBouncedVelocity_m_s),
         Eigen::Vector3d::Constant(kMetAttitude_rad), Eigen::Vector3d::Constant(kMetRate_rad_s);
     const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
-    // On an error the filter stays as it is.
+    // If that fails, the filter stays unchanged.
     (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
 }
 
@@ -249,7 +249,7 @@ void StateEstimator::on_touchdown(std::int64_t t_ns) {
     more.segment<3>(3).setConstant(kBouncedVelocity_m_s);
     const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
     (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
-    // The ground carries it.
+    // The ground compensates gravity.
     tracker_.filter().accelerate(this->t_ns(), ground_field(scenario_.orbit).gravity_m_s2);
     resting_ = true;
 }
@@ -274,10 +274,10 @@ UpdateResult StateEstimator::take(const TargetMeasurement& measurement) {
     return result;
 }
 
-/// After an update of the filter that had the covariance `before`: with K its gain and H the measurement's
-/// Jacobian, I - K H is covariance * before^-1, and K H is what the state takes over of the star tracker's error.
-/// The filter takes those of several measurements for independent, even by one report: of these the one that weighs
-/// most counts, as its covariance does not have the sum.
+/// Call after an update of the filter whose covariance was `before`. With gain K and measurement Jacobian H, I - K
+/// H is covariance * before^-1, and K H is the part of the star tracker's error that the state takes over. The
+/// filter takes the errors of several measurements by one report as independent, so its covariance does not include
+/// their sum: only the one with the largest weight is kept.
 void StateEstimator::correlate(const Matrix12& before, double share) {
     const Matrix12 kept = before.ldlt().solve(filter().covariance()).transpose();
     const auto J = star_tracker_jacobian(filter().state(), q_frame_chaser(t_ns()));
@@ -307,7 +307,7 @@ std::optional<UpdateResult> StateEstimator::take(const TargetVelocity& v) {
     if (v.t_ns > t_ns()) advance(v.t_ns);
     const AttitudeTrack::At chaser = attitude_.at(v.t_ns);
     const Vec3 origin = v.origin_m - scenario_.chaser.centre_of_mass_m;
-    // The star tracker's error turns the beam, over ground into the velocity across it.
+    // The star tracker's error rotates the beam; over ground this adds a part of the velocity across the beam.
     const double across_m_s =
         scenario_.orbit.model == Orbit::Model::surface ? norm(filter().state().velocity_m_s) : 0;
     return tracker_.update(BeamVelocity{
@@ -327,15 +327,15 @@ RelativeMotion StateEstimator::motion() const {
     return in_world(filter().state(), scenario_.orbit, t_s(t_ns()), now.q_world_chaser, now.rate_rad_s);
 }
 
-/// At most so much of the state's variance along any direction: what is linearized at different poses could make it
-/// more than all of it where the star tracker's error is the largest.
+/// Limits the shared error to a part of the state's variance in any direction: linearisation at different poses
+/// could make it exceed the variance where the star tracker's error dominates.
 Eigen::Matrix<double, 12, 3> StateEstimator::by_star_tracker(double sigma_rad) const {
-    constexpr double kMostShared = 0.95;
+    constexpr double kMaxShared = 0.95;
     const Eigen::Matrix3d shared =
         sigma_rad * sigma_rad * by_star_tracker_.transpose() * filter().covariance().ldlt().solve(by_star_tracker_);
     const double most =
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(shared, Eigen::EigenvaluesOnly).eigenvalues()[2];
-    return std::sqrt(kMostShared / std::max(most, kMostShared)) * by_star_tracker_;
+    return std::sqrt(kMaxShared / std::max(most, kMaxShared)) * by_star_tracker_;
 }
 
 TargetEstimate StateEstimator::estimate() const {
@@ -343,8 +343,8 @@ TargetEstimate StateEstimator::estimate() const {
     const PoseFilter::Pose pose = filter().pose(q);
     const Rigid3 T_mass_target{{}, -scenario_.target.centre_of_mass_m};
     const double sigma_rad = kDegree * scenario_.attitude_sensor.attitude_sigma_deg;
-    // Turning the state to the chaser's axes adds the star tracker's error, and takes away what of the same error
-    // came with the measurements.
+    // Rotating the state to the chaser's axes adds the star tracker's error, and cancels the part of that error
+    // that entered with the measurements.
     const auto by = by_star_tracker(sigma_rad);
     Eigen::Matrix<double, 6, 3> known;
     known << rotation_matrix(conjugate(q) * filter().state().q_frame_target) * by.middleRows<3>(6),
@@ -356,20 +356,20 @@ TargetEstimate StateEstimator::estimate() const {
     const Rigid3 T = Rigid3{{}, scenario_.chaser.centre_of_mass_m} * pose.T_chaser_target * T_mass_target;
     TargetEstimate out{
         T, covariance_of_product(pose.T_chaser_target, covariance, T_mass_target) + covariance_of_model(T)};
-    // The filter's position is against the map, whose error below the chaser stays the same for many measurements.
+    // The filter's position is relative to the map, whose error below the chaser is the same for many measurements.
     const Eigen::Vector3d map_error =
         scenario_.navigation.map_sigma_m * to_eigen(T.q * (scenario_.target.T_body_port.q * Vec3{1, 0, 0}));
     out.covariance.bottomRightCorner<3, 3>() += map_error * map_error.transpose();
     return out;
 }
 
-/// Errors of the model are the same in all measurements: they stay, however many there are, and the filter's own
-/// covariance does not know them. Where no pose was measured, only beams: about what they do to one.
+/// Model errors are common to all measurements: they do not average out, and the filter's own covariance does not
+/// include them. If only beams were measured, no pose: approximately their effect on a pose.
 Matrix6 StateEstimator::covariance_of_model(const Rigid3& T_chaser_target) const {
     if (by_model_) return *by_model_;
     ModelUncertainty u = scenario_.model_error.uncertainty();
     if (u == ModelUncertainty{}) return Matrix6::Zero();
-    // A camera's focal length acts as the size does, and a bias of ranges as a shift at most.
+    // A focal length error acts like a size error, and a range bias at most like a shift.
     u.scale = std::hypot(u.scale, u.focal), u.focal = 0;
     u.mesh_m = std::hypot(u.mesh_m, u.range_bias_m);
     return covariance_by(image_shifts(u, T_chaser_target, motion_in_chaser()));

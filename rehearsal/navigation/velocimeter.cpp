@@ -7,7 +7,7 @@
 namespace narpa::rehearsal {
 namespace {
 
-constexpr double kLeastWidth_m = 0.2;  ///< of the surface that stands for a plane
+constexpr double kMinWidth_m = 0.2;  ///< smallest width of the surface that is approximated by a plane
 
 }  // namespace
 
@@ -59,8 +59,8 @@ std::optional<TargetRange> Velocimeter::measure_range(const LidarBeamReport& rep
                   .range_m = report.range_m};
     const Rigid3 T_target_chaser = inverse(T_chaser_target);
     const Vec3 origin = T_target_chaser * r.origin_m, u = T_target_chaser.q * r.direction;
-    // The plane through where the beam and two more beside it meet the model, as wide as the pose is uncertain.
-    const double width_m = std::max(kLeastWidth_m, position_sigma_m);
+    // The plane through the hits of the beam and of rays beside it, as far apart as the pose is uncertain.
+    const double width_m = std::max(kMinWidth_m, position_sigma_m);
     const Vec3 x = normalized(cross(u, std::abs(u.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0})), y = cross(u, x);
     std::array<Vec3, 5> points;
     constexpr std::array<std::array<double, 2>, 5> kOffsets{{{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
@@ -76,7 +76,7 @@ std::optional<TargetRange> Velocimeter::measure_range(const LidarBeamReport& rep
     std::optional<Vec3>& measured = measured_m_[report.beam];
     if (measured && norm(points[0] - *measured) < map_correlation_m_) return std::nullopt;
     measured = points[0];
-    // Second differences: how much the surface bends within that width.
+    // Second differences: deviation of the surface from a plane within that width.
     const double bend_m = std::abs(dot(mean - points[0], u));
     const double twist_m = 0.25 * std::abs(dot(points[1] + points[2] - points[3] - points[4], u));
     r.sigma_m = std::hypot(lidar_.receiver.range_noise_m, lidar_.model->spec().range_resolution_m / std::sqrt(12.0),

@@ -28,7 +28,7 @@ json read_json(const std::string& file) {
     return document.is_discarded() ? json(nullptr) : document;
 }
 
-/// What a failed run's result says; where it left none, its error.
+/// The headline of a failed run's result; its error if it has no result.
 std::string failure_of(const std::string& folder, const std::string& log) {
     const json result = read_json(folder + "/result.json");
     return result.is_object() ? result.value("headline", error_in(log)) : error_in(log);
@@ -148,7 +148,7 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
             shown = now;
             show_progress();
         }
-        // Once each: a second request makes a run exit before it has written what it has.
+        // Once each: a second request makes a run exit before it has written its results.
         for (Running& r : running)
             if (stop && !std::exchange(r.asked_to_stop, true)) r.child.terminate();
         std::this_thread::sleep_for(std::chrono::milliseconds(50));

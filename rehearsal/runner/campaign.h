@@ -15,21 +15,21 @@
 namespace narpa::rehearsal {
 
 struct CampaignOptions {
-    RehearsalOptions run;    ///< of each; seed: of run 1, run k has that + k - 1
+    RehearsalOptions run;    ///< options of each run; seed: that of run 1, run k has that + k - 1
     std::size_t runs = 100;  ///< each in FOLDER/runs/0001 ...
     int jobs = 1;            ///< runs in parallel
 };
 
-/// Starts `narpa rehearse` for each run that has no result of this scenario and seed yet, and summarises all:
-/// summary.json, junit.xml, index.html in the folder. The document is that of summary.json.
+/// Starts `narpa rehearse` for each run that has no result of this scenario and seed yet, and summarises all in the
+/// folder: summary.json, junit.xml, index.html. Returns the document of summary.json.
 Result<nlohmann::json> run_campaign(const CampaignOptions& options, const Console& console, const StopFlag& stop);
 
-/// How far a run is.
+/// Progress of a run.
 struct RunProgress {
     double share = 0;
     std::string text;  ///< "t = 12.0 s of about 93 s"; empty: not known yet
 };
-/// From the last progress line in its log.
+/// Progress from the last progress line in a run's log.
 [[nodiscard]] RunProgress progress_of(const std::string& log);
 
 /// One run of a campaign.
@@ -37,18 +37,18 @@ struct RunResult {
     std::size_t run = 0;
     std::uint64_t seed = 0;
     std::string folder;     ///< within the campaign's
-    nlohmann::json result;  ///< as in its result.json; null: it has none
+    nlohmann::json result;  ///< the content of its result.json; null: none
 };
-/// True where a run's folder has a result of this scenario and seed.
+/// True if a run's folder has a result of this scenario and seed.
 [[nodiscard]] bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed);
 
 /// The "contact" objects of the runs that made contact.
 [[nodiscard]] std::vector<nlohmann::json> contacts_of(const std::vector<RunResult>& runs);
 /// Success rate with its interval, failures by gate and reason, contact conditions, navigation.
 [[nodiscard]] nlohmann::json summarise(const Scenario& scenario, const std::vector<RunResult>& runs);
-/// "98 of 100 runs succeeded: 98.0 %", or how many were flown where that is not all.
+/// "98 of 100 runs succeeded: 98.0 %", or the number flown if not all were.
 [[nodiscard]] std::string campaign_headline(const nlohmann::json& summary);
-/// The charts of FOLDER/charts become part of it.
+/// Embeds the charts of FOLDER/charts.
 [[nodiscard]] std::string campaign_page(const Scenario& scenario, const nlohmann::json& summary,
                                         const std::string& folder);
 /// A test case for each run, by its first failed gate.

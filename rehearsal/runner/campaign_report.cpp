@@ -20,7 +20,7 @@ std::vector<json> contacts_of(const std::vector<RunResult>& runs) {
 
 namespace {
 
-/// The gate that a run failed at first; the trouble or the lack of a result where there is none.
+/// The first gate that a run failed; else its trouble, or that it has no result.
 std::pair<std::string, std::string> cause(const RunResult& run) {
     if (!run.result.is_object()) return {"no result", fmt::format("see {}.log", run.folder)};
     if (const std::string trouble = run.result.value("trouble", ""); !trouble.empty()) return {"trouble", trouble};
@@ -39,7 +39,7 @@ bool passed(const RunResult& run) {
     return run.result.is_object() && run.result.value("passed", false);
 }
 
-/// A value of each contact condition over the runs, in the order of the standard's table.
+/// The values of one contact condition over the runs, in the order of the standard's table.
 struct Condition {
     std::string name, title, unit;
     double min = 0, max = 0;

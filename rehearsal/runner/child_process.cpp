@@ -29,7 +29,7 @@ int open_for_output(const std::string& file) {
 /// The child's end of the pipe of base/ready.h.
 constexpr int kReadyFd = 3;
 
-/// Between fork and exec: nothing here allocates.
+/// Runs between fork and exec: must not allocate.
 [[noreturn]] void become(char* const* line, char* const* environment, int in, int out, int err, int ready) {
     ::setpgid(0, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -39,7 +39,7 @@ constexpr int kReadyFd = 3;
     ::dup2(in, STDIN_FILENO);
     ::dup2(out, STDOUT_FILENO);
     ::dup2(err, STDERR_FILENO);
-    if (ready == kReadyFd) ::fcntl(ready, F_SETFD, 0);  // dup2 would leave it to be closed by exec
+    if (ready == kReadyFd) ::fcntl(ready, F_SETFD, 0);  // dup2 onto itself would leave it close-on-exec
     if (ready >= 0 && ready != kReadyFd) ::dup2(ready, kReadyFd);
     ::execve(line[0], line, environment);
     ::_exit(127);
@@ -104,7 +104,7 @@ Result<ChildProcess> ChildProcess::start(Command command) {
     if (pid < 0)
         return Error{fmt::format("cannot start {}: {}", command.name, std::strerror(errno)), command.err, 0, 0,
                      ErrorKind::failed};
-    ::setpgid(pid, pid);  // both sides do: whoever is first
+    ::setpgid(pid, pid);  // parent and child both call it: whichever is first
     return ChildProcess(pid, std::move(read_end));
 }
 
@@ -148,7 +148,7 @@ void ChildProcess::stop(double grace_s) {
     terminate();
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(grace_s);
     while (!status() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(5ms);
-    ::kill(-pid_, SIGKILL);  // what it started and left behind, too
+    ::kill(-pid_, SIGKILL);  // also kills what it started and left behind
     while (!status()) std::this_thread::sleep_for(1ms);
     pid_ = -1;
 }

@@ -1,4 +1,4 @@
-/// rehearsal/runner/child_process.h - another program: started, watched and stopped.
+/// rehearsal/runner/child_process.h - starts, watches and stops another program.
 #pragma once
 
 #include <sys/types.h>
@@ -14,12 +14,12 @@
 
 namespace narpa::rehearsal {
 
-/// Runs in a process group of its own, so that the programs it starts are stopped with it; the kernel stops it when
-/// its parent ends.
+/// Runs in its own process group, so that the programs it starts are stopped with it; the kernel stops it when its
+/// parent ends.
 class ChildProcess {
 public:
-    /// How the program gets the descriptor of base/ready.h: not at all, by `--ready-fd N` after its arguments, or
-    /// by the environment variable READY_FD.
+    /// How the program receives the descriptor of base/ready.h: not at all, by `--ready-fd N` after its arguments,
+    /// or by the environment variable READY_FD.
     enum class Ready : std::uint8_t { none, option, variable };
     struct Command {
         std::string name;                                              ///< "the dynamics", for people
@@ -28,7 +28,7 @@ public:
         std::string out, err;                                          ///< files; one file may take both
         Ready ready = Ready::none;
     };
-    /// The line as a shell takes it.
+    /// The command line, quoted for a shell.
     [[nodiscard]] static std::string shell_line(const Command& command);
 
     static Result<ChildProcess> start(Command command);
@@ -38,9 +38,9 @@ public:
 
     /// Exit status, or 128 + the signal that ended it; empty while it runs.
     std::optional<int> status();
-    /// Its lines KEY=VALUE once READY=1 has come; does not wait.
+    /// The program's lines KEY=VALUE once READY=1 has arrived; does not wait.
     [[nodiscard]] std::optional<std::string> ready();
-    /// Until `ready` may have something new or the time is over.
+    /// Waits until `ready` may have something new or the time is over.
     void wait_ready(std::int64_t timeout_ns) const;
     /// SIGTERM; does not wait.
     void terminate() const;
@@ -60,7 +60,7 @@ private:
 
 /// The last line of a text file that is not blank; empty where there is none.
 [[nodiscard]] std::string last_line(const std::string& file);
-/// The error of one of our programs in what it printed, "narpa: " left out, with its remedy; else the last line.
+/// The error that one of our programs printed, without "narpa: ", with its remedy; else the last line.
 [[nodiscard]] std::string error_in(const std::string& file);
 [[nodiscard]] std::string read_text(const std::string& file);
 
@@ -73,7 +73,7 @@ struct Program {
     [[nodiscard]] bool ended() { return child && child->status(); }
     /// "the navigation ended with status 7: its error"; empty while it runs and after status 0.
     [[nodiscard]] std::string failure();
-    /// An Error of the kind that its exit status stands for; failed, where it is a program of the user's.
+    /// An Error of the kind that its exit status stands for; kind `failed` for a program of the user's.
     [[nodiscard]] Error start_error(const std::string& what);
 };
 

@@ -15,14 +15,14 @@
 namespace narpa::rehearsal {
 namespace {
 
-/// The last port from which every make's position port can still be reached.
+/// The largest data port from which every make's position port is still in range.
 int last_data_port() {
     int offset = 0;
     for (const LidarMake* make : lidar_makes()) offset = std::max(offset, make->network.position_port_offset());
     return 65535 - offset;
 }
 
-/// Bound to any free port; -1: none.
+/// Binds to any free port; returns -1 if there is none.
 int bind_any(int fd) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
@@ -38,7 +38,7 @@ int bind_any(int fd) {
 Result<int> free_lidar_port() {
     constexpr int kTries = 200;
     const int last = last_data_port();
-    std::vector<int> held;  // ports that are too high stay taken while others are tried
+    std::vector<int> held;  // ports that are too high stay occupied while others are tried
     int port = 0;
     for (int k = 0; k < kTries; ++k) {
         held.push_back(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));

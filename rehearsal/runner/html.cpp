@@ -1,4 +1,4 @@
-// HTML parts of all report pages.
+// HTML parts shared by all report pages.
 #include <fmt/format.h>
 
 #include "base/base64.h"

@@ -31,8 +31,8 @@ using Ready = ChildProcess::Ready;
 
 constexpr double kStartPatience_s = 120, kCommandPatience_s = 10, kEndPatience_s = 20;
 constexpr double kSpeedWindow_s = 5;
-constexpr double kStalled_s = 5;  ///< of wall time; a clock that stands still for longer is reported
-constexpr double kEnding_s = 2;   // to end the programs and to draw charts and page, typically
+constexpr double kStalled_s = 5;  ///< wall time; a clock that stands still for longer is reported
+constexpr double kEnding_s = 2;   // typical time to end the programs and to draw charts and page
 constexpr std::int64_t kBusWait_ns = 20'000'000;
 
 double seconds_since(Clock::time_point t) {
@@ -92,12 +92,12 @@ private:
 
     // --- Folder and sensor links ---
 
-    /// What a run leaves in its folder.
+    /// Files that a run leaves in its folder.
     static constexpr std::array kFiles{"emulator",       "dynamics",   "navigation",     "emulator.log",
                                        "dynamics.log",   "charts",     "navigation.log", "charts.json",
                                        "result.json",    "junit.xml",  "index.html",     "scenario.toml",
                                        "rehearsal.json", "scene.toml", "map.toml"};
-    /// Subfolders: of an earlier run's files until all programs have started, and of a start that failed.
+    /// Subfolders: for an earlier run's files until all programs have started, and for a start that failed.
     static constexpr const char *kEarlier = "earlier", *kFailedStart = "failed-start";
 
     /// Replaces the run in the folder `to` by that in `from`.
@@ -110,7 +110,7 @@ private:
         }
     }
 
-    /// Back to the earlier run, where there is one.
+    /// Moves the earlier run back, if there is one.
     void restore_earlier() {
         std::error_code failed;
         if (!fs::exists(in_folder(kEarlier), failed)) return;
@@ -140,7 +140,7 @@ private:
         for (const char* name : kFiles) fs::remove_all(in_folder(name), failed);
         for (const char* name : {"emulator", "dynamics", "navigation"})
             fs::create_directories(in_folder(name), failed);
-        // The mark of a rehearsal's folder, even if this one gets no further.
+        // Marks the folder as a rehearsal's, even if this run gets no further.
         if (Status good = write_file(in_folder("rehearsal.json"), "{}\n"); !good) return good;
         const auto texts = scenario_texts(scenario_);
         if (!texts) return texts.error();
@@ -284,7 +284,7 @@ private:
         return Ok{};
     }
 
-    /// A command of the user's may print the line "ready" instead of writing to READY_FD.
+    /// A user's command may print the line "ready" instead of writing to READY_FD.
     Result<bool> navigation_is_ready(double waited_s) {
         if (!navigation_.child && console_.navigation_ready) return console_.navigation_ready();
         if (!navigation_.child) return waited_s > kCommandPatience_s;
@@ -324,7 +324,7 @@ private:
             judge_.accept(received.frame, std::max<std::int64_t>(judge_.bus().t_heartbeat_ns, 0));
     }
 
-    /// Until the dynamics report the end, a program ends, or the clock stands still for too long.
+    /// Runs until the dynamics report the end, a program ends, or the clock stands still for too long.
     void fly() {
         auto advanced = Clock::now(), shown = advanced;
         std::int64_t newest = BusRecord::kNever;
@@ -366,13 +366,13 @@ private:
         console_.progress(overdue ? -1 : t_s / nominal_s_, overdue ? -1 : left_s(t_s), text);
     }
 
-    /// The speed changes as the target fills the frames: that of the last kSpeedWindow_s to twice that counts.
+    /// The speed changes as the target fills the frames: it is averaged over the last one to two kSpeedWindow_s.
     void mark_time(double t_s) {
         if (marks_.empty() || seconds_since(marks_.back().first) > kSpeedWindow_s)
             marks_.emplace_back(Clock::now(), t_s);
         if (marks_.size() > 2) marks_.erase(marks_.begin());
     }
-    /// Of wall time; negative: too little is known.
+    /// Remaining wall time; negative: not known yet.
     double left_s(double t_s) const {
         const auto& [then, t_then_s] = marks_.front();
         const double passed_s = seconds_since(then), speed = (t_s - t_then_s) / passed_s;
@@ -415,7 +415,7 @@ private:
                             {"seed", seed()},
                             {"version", options_.version},
                             {"trouble", trouble_}});
-        // The verdict first: on a full disk the rest may have no room.
+        // The verdict is written first: on a full disk the rest may have no room.
         keep_first(done.written, write_whole(in_folder("result.json"), done.result.dump(2) + "\n"));
         keep_first(done.written, write_junit(in_folder("junit.xml"), junit(v, scenario_.name, done.wall_s)));
         if (!options_.page) return done;
@@ -437,7 +437,7 @@ private:
                  [this](const GateResult& g) { console_.print(fmt::format("gate {}: {}", g.name, g.reason)); }};
     const double nominal_s_ = scenario_.nominal_duration_s();
     const Clock::time_point began_ = Clock::now();
-    std::vector<std::pair<Clock::time_point, double>> marks_;  ///< when the simulation was at which time
+    std::vector<std::pair<Clock::time_point, double>> marks_;  ///< wall time and simulation time
     Descriptor lock_;                                          ///< on the folder
     std::string hash_, bus_name_, trouble_;
     std::vector<std::string> video_, lidar_sinks_, lidar_sources_;  ///< NAME=SINK, NAME=SOURCE

@@ -36,17 +36,17 @@ struct RehearsalResult {
     std::string page;  ///< empty: none
     double wall_s = 0;
     nlohmann::json result;  ///< as in result.json
-    Status written{Ok{}};   ///< the first file of the report that could not be written
+    Status written{Ok{}};   ///< error of the first file of the report that could not be written
 };
 
 /// Where messages for people go.
 struct Console {
     std::function<void(std::string_view)> print;
-    /// How far it is: the share of the whole that is done, the seconds of wall time left (each negative where it is
-    /// not known), and a text.
+    /// Reports progress: the share that is done, the seconds of wall time left (each negative if not known), and a
+    /// text.
     std::function<void(double share, double left_s, std::string_view)> progress;
-    /// Polled where the user starts the navigation ("none"): whether it is ready; an Error where nobody can say so.
-    /// Empty: it is after ten seconds.
+    /// Polled if the user starts the navigation ("none"): whether it is ready; an Error if nobody can say so.
+    /// Empty: it is taken as ready after ten seconds.
     std::function<Result<bool>()> navigation_ready{};
 };
 

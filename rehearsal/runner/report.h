@@ -14,8 +14,7 @@
 
 namespace narpa::rehearsal {
 
-/// `record` as in rehearsal.json. The pictures of FOLDER/navigation and the charts of FOLDER/charts become part of
-/// it.
+/// `record` as in rehearsal.json. Embeds the pictures of FOLDER/navigation and the charts of FOLDER/charts.
 [[nodiscard]] std::string rehearsal_page(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict,
                                          const nlohmann::json& record, const std::string& folder);
 
@@ -27,9 +26,9 @@ namespace narpa::rehearsal {
 [[nodiscard]] Status draw_charts(const std::string& folder, const nlohmann::json& document);
 
 struct PageChart {
-    std::string_view name, title;  ///< the file's, without .svg; the text for people who cannot see it
+    std::string_view name, title;  ///< file name without .svg; text for people who cannot see it
 };
-/// Those charts of FOLDER/charts that exist. Where there is none, a sentence on how to draw them.
+/// The existing charts among those in FOLDER/charts. If there is none, a sentence on how to draw them.
 [[nodiscard]] std::string charts_of(const std::string& folder, std::initializer_list<PageChart> charts);
 
 /// The HTML document around the body of a page.
@@ -46,7 +45,7 @@ public:
 
 private:
     std::vector<bool> numbers_;
-    std::vector<std::string> titles_;  ///< beside each cell where the page is narrow
+    std::vector<std::string> titles_;  ///< shown beside each cell on a narrow page
     std::string rows_ = "<table>";
 };
 

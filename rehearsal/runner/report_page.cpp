@@ -111,7 +111,7 @@ std::string errors(const Run& run) {
 std::string contact_bars(const ContactConditions& conditions) {
     std::string rows;
     for (const ContactCondition& c : conditions) {
-        // Full scale is a third beyond the limit, or at the value where that is more.
+        // Full scale is a third beyond the limit, or just beyond the value if that is more.
         const double percent = 100 / std::max(c.max * 1.33, c.value * 1.05);
         const std::string asked =
             c.min > 0 ? fmt::format("{:g} to {:g}", c.min, c.max) : fmt::format("at most {:g}", c.max);
@@ -182,7 +182,7 @@ std::string picture(const fs::path& file, const std::string& text, std::string_v
         style, escape(text), base64(read_text(file.string())));
 }
 
-/// Frames over the run, from the emulator's log: whatever navigation flew.
+/// Frames over the run, from the emulator's log, so independent of the navigation used.
 std::string contact_sheets(const Run& run) {
     std::string out;
     std::error_code none;
@@ -210,7 +210,7 @@ std::string pictures(const Run& run) {
     return out + "</div>\n" + sheets;
 }
 
-/// Links to what lies beside the page.
+/// Links to the files beside the page.
 std::string logs(const Run& run) {
     constexpr std::array<std::pair<const char*, const char*>, 14> kFiles{
         {{"result.json", "the verdict"},

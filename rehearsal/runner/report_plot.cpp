@@ -13,7 +13,7 @@ json of(const Vec3& v) {
     return {v.x, v.y, v.z};
 }
 
-/// One array for each key, a value from each sample.
+/// One array per key, with a value from each sample.
 template <class Sample>
 json columns(const std::vector<Sample>& samples,
              std::initializer_list<std::pair<const char*, json (*)(const Sample&)>> values) {
@@ -47,7 +47,7 @@ json of_estimates(const BusRecord& bus) {
     return out;
 }
 
-/// Stretches of commands with the same phase and leg.
+/// Intervals of commands with the same phase and leg.
 json of_phases(const BusRecord& bus) {
     json out = json::array();
     const auto& commands = bus.commands;
@@ -92,7 +92,7 @@ json of_gates(const Gates& g) {
     return out;
 }
 
-/// What the navigation commanded in each period, in the chaser's body axes, and the change of speed so far.
+/// The navigation's commands in each period, in the chaser's body axes, and the accumulated change of speed.
 json of_thrusters(const Scenario& scenario, const BusRecord& bus) {
     using C = ActuatorCommand;
     json out = columns<C>(bus.commands,
@@ -105,7 +105,7 @@ json of_thrusters(const Scenario& scenario, const BusRecord& bus) {
     return out;
 }
 
-/// From the pose command to the hand-over; none in lockstep, where the clock waits.
+/// Latency from the pose command to the hand-over; none in lockstep, where the clock waits.
 json of_latency(const BusRecord& bus, bool lockstep) {
     json t = json::array(), ms = json::array();
     for (const FrameLedger& f : bus.ledgers)

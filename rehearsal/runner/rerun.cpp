@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// Removed by the destructor.
+/// A temporary folder; the destructor removes it.
 class TemporaryFolder {
 public:
     TemporaryFolder() {
@@ -45,7 +45,7 @@ bool is_starting(const std::string& line) {
            beat.state == RunState::starting;
 }
 
-/// Without the last column of a LiDAR's sweeps: what receivers on this machine lost is chance.
+/// Drops the last column of a LiDAR's sweeps: how many packets receivers on this machine lost is random.
 bool next_line(std::ifstream& file, bool sweeps, std::string& line) {
     while (std::getline(file, line)) {
         if (sweeps) line.resize(std::min(line.size(), line.rfind(',')));
@@ -55,7 +55,8 @@ bool next_line(std::ifstream& file, bool sweeps, std::string& line) {
     return false;
 }
 
-/// What each rehearsal in lockstep leaves: without one of them not all of it is compared.
+/// Checks for the files that each rehearsal in lockstep leaves: if one is missing, the comparison would be
+/// incomplete.
 Status check_logs(const std::string& folder, const Scenario& scenario, const json& record) {
     std::vector<std::string> files{"emulator/can.log"};
     for (const std::string& camera : scenario.navigation.cameras)
@@ -127,7 +128,8 @@ Result<json> read_record(const std::string& folder) {
 
 namespace {
 
-/// The command that replaces a program, or empty. A log may come from anywhere: its own command is only shown.
+/// The command that replaces a program, or empty. A log may be from anyone: the command in it is only shown, never
+/// run.
 Result<std::string> replacement(const json& record, const std::string& folder, const std::string& program,
                                 const std::string& given) {
     if (!given.empty()) return given;

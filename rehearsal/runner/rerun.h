@@ -13,14 +13,14 @@ namespace narpa::rehearsal {
 
 /// The first place where two files differ.
 struct Difference {
-    std::size_t line = 0;  ///< from 1, of the lines that are compared
+    std::size_t line = 0;  ///< from 1, counting only the lines that are compared
     std::string is, was;   ///< now and before; empty: end of file
 };
-/// Line by line; heartbeats of the starting emulator are skipped: which of them a client receives is chance.
+/// Compares line by line; skips heartbeats of the starting emulator, as which of them a client receives is random.
 [[nodiscard]] std::optional<Difference> first_difference(const std::string& is, const std::string& was);
 
-/// "t = 3.050 s: dynamics report + 1 (id 0x751), data ..." of a line of a candump log; the line itself where it is
-/// none.
+/// "t = 3.050 s: dynamics report + 1 (id 0x751), data ..." for a line of a candump log; the line itself if it is
+/// not one.
 [[nodiscard]] std::string describe_message(const Scenario& scenario, const std::string& line);
 
 /// rehearsal.json. Errors: missing, or not the record of a rehearsal.
@@ -35,7 +35,7 @@ struct RerunOptions {
 };
 /// Runs it with the same seed into a temporary folder and compares the bus, ledgers, truths and the logs of
 /// navigation and dynamics. For runs in lockstep. A command that the record names is never run: it is an Error
-/// unless the options name one in its place.
+/// unless the options name a replacement.
 Result<nlohmann::json> rerun(const RerunOptions& options, const Console& console, const StopFlag& stop);
 
 }  // namespace narpa::rehearsal

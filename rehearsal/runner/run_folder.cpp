@@ -60,7 +60,7 @@ Result<Descriptor> lock_folder(const std::string& folder) {
     if (failed) return Error{"cannot be made: " + failed.message(), folder};
     Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (!lock) return Error{fmt::format("cannot be read: {}", std::strerror(errno)), folder};
-    // Some network file systems have no locks: there the folder is used without.
+    // Some network file systems have no locks: there the folder is used unlocked.
     if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
         return Error{"is in use by another run that has not ended, expected a folder of its own for each", folder};
     return lock;

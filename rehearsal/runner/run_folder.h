@@ -9,13 +9,13 @@
 
 namespace narpa::rehearsal {
 
-/// Makes the folder and locks it until the descriptor closes; an Error where another program has locked it.
+/// Creates the folder and locks it until the descriptor closes; an Error if another program has locked it.
 Result<Descriptor> lock_folder(const std::string& folder);
-/// The same for a folder that is empty or has `mark` in it; an Error where it holds other files.
+/// The same for a folder that is empty or contains `mark`; an Error if it holds other files.
 Result<Descriptor> claim_folder(const std::string& folder, const char* mark);
 
-/// Scenario, scene and the navigation's map with all that they are based on, as one TOML text each, and 16
-/// hexadecimal digits of all of it. Without a map its text is empty.
+/// Scenario, scene and the navigation's map, each with everything it is based on, as one TOML text, and a hash of
+/// all as 16 hexadecimal digits. Without a map its text is empty.
 struct ScenarioTexts {
     std::string scenario, scene, map, hash;
 };

@@ -1,14 +1,14 @@
 /// rehearsal/scenario/scenario.h - the description of a rehearsal: two bodies, their start, guidance and control,
 /// faults and gates. docs/rehearsal.md documents every key of the file.
 ///
-/// Frames. World: the scene's, inertial axes, its origin at the target's centre of mass. LVLH (W. Clohessy,
-/// R. Wiltshire, 1960): x up, away from the attractor, y along the circular orbit, z along its momentum, rotating
-/// about z with the orbit's rate. Port: a docking interface's, x out of it. Docked, the chaser's port is the
-/// target's turned by 180 degrees about z. All times are seconds after the scenario's time 0.
+/// Frames. World: the scene's, inertial axes, its origin at the target's centre of mass. LVLH (W. Clohessy, R.
+/// Wiltshire, 1960): x up, away from the attractor, y along the circular orbit, z along its angular momentum,
+/// rotating about z with the orbit's rate. Port: axes of a docking interface, x out of it. When docked, the
+/// chaser's port is the target's rotated by 180 degrees about z. All times are seconds after the scenario's time 0.
 ///
-/// A landing has the same form. The target is the ground, its centre of mass a point that is fixed to it, its port
-/// the landing site with x up; the chaser's port is in the plane of its feet, x down. In place of LVLH are axes
-/// that turn with the planet, z along its axis of rotation.
+/// A landing uses the same form. The target is the ground, its centre of mass a point fixed to it, its port the
+/// landing site with x up; the chaser's port is in the plane of its feet, x down. LVLH is replaced by axes that
+/// rotate with the planet, z along its axis of rotation.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,26 +40,27 @@ struct Orbit {
     Model model = Model::clohessy_wiltshire;
     double radius_m = 6'778'137, mu_m3_s2 = 3.986004418e14;
     Vec3 up{0, 0, 1}, along{1, 0, 0};  ///< world axes at time 0: away from the attractor, and the target's velocity
-    /// Surface: radius_m is the target's centre of mass' from the planet's, `up` points away from it.
+    /// Surface: radius_m is the distance of the target's centre of mass from the planet's; `up` points away from
+    /// it.
     Vec3 axis{0, 1, 0};  ///< of the planet's rotation, world axes
     double rotation_rad_s = 0, j2 = 0, equatorial_radius_m = 0;
 
-    /// 0 where the model is free; of the planet's rotation where it is surface.
+    /// 0 for the free model; the planet's rotation rate for the surface model.
     [[nodiscard]] double rate_rad_s() const;
-    /// The frame of relative motion, LVLH or axes that turn with the planet, to world axes.
+    /// Rotation from the frame of relative motion (LVLH, or axes that rotate with the planet) to world axes.
     [[nodiscard]] Quat q_world_frame(double t_s) const;
-    /// Surface: gravity at `from_centre_m` of a planet with the given axis of rotation, in the axes of both: of a
-    /// point mass and J2 (O. Montenbruck, E. Gill, Satellite Orbits, 2000, section 3.2).
+    /// Surface: gravity at `from_centre_m` of a planet with the given axis of rotation, in the axes of both: point
+    /// mass and J2 (O. Montenbruck, E. Gill, Satellite Orbits, 2000, section 3.2).
     [[nodiscard]] Vec3 gravity_m_s2(const Vec3& from_centre_m, const Vec3& unit_axis) const;
     /// Surface: acceleration of a free body at `position_m` from the target's centre of mass, which moves with the
     /// ground; world axes (inertial).
-    [[nodiscard]] Vec3 fall_m_s2(double t_s, const Vec3& position_m) const;
+    [[nodiscard]] Vec3 relative_free_fall_m_s2(double t_s, const Vec3& position_m) const;
 };
 
 /// A rigid body of the scene that the dynamics command.
 struct Vehicle {
     std::string body;          ///< its name in the scene
-    std::uint32_t can_id = 0;  ///< from there
+    std::uint32_t can_id = 0;  ///< as in the scene
     Vec3 centre_of_mass_m{};   ///< body axes
     Rigid3 T_body_port{};      ///< port axes to body axes
     double mass_kg = 1;
@@ -69,7 +70,7 @@ struct Vehicle {
 /// Rotation of the target, from the scene's attitude at time 0.
 struct TargetMotion {
     bool with_lvlh = true;  ///< rotates with LVLH, plus the rate below
-    Vec3 rate_deg_s{};      ///< body axes, at time 0; against LVLH or against inertial space
+    Vec3 rate_deg_s{};      ///< body axes, at time 0; relative to LVLH or to inertial space
 };
 
 inline constexpr std::array<std::string_view, 12> kThrusterGroupNames{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
@@ -87,19 +88,19 @@ struct Engine {
     std::size_t group = 4;  ///< index in kThrusterGroupNames, of a force
     double least_n = 0, most_n = 0;
     double gain_sigma = 0.005;      ///< of the force, drawn for each period
-    double specific_impulse_s = 0;  ///< 0: the mass stays
+    double specific_impulse_s = 0;  ///< 0: the mass is constant
     double tilt_most_deg = 30;      ///< of its axis from the vertical, as commanded
 
     [[nodiscard]] int axis() const { return static_cast<int>(group / 2); }     ///< 0 to 2: x, y, z
     [[nodiscard]] double sign() const { return group % 2 == 0 ? 1.0 : -1.0; }  ///< of the force along it
 };
 
-/// Legs that meet the ground: each foot is a spring with a damper along the ground's normal, and friction.
+/// Legs that touch the ground: each foot is a spring with a damper along the ground's normal, and friction.
 struct LandingGear {
     std::vector<Vec3> feet_m;  ///< chaser's port axes: evenly on a circle about its x
     double stiffness_n_m = 40e3, damping_n_s_m = 6e3, friction = 0.6;  ///< of each
-    double stroke_m = 0.3;                                             ///< a foot that goes deeper breaks
-    double tipped_deg = 45;  ///< further from the vertical it has tipped over
+    double stroke_m = 0.3;                                             ///< a foot that penetrates deeper breaks
+    double tipped_deg = 45;  ///< it has tipped over if further from the vertical
 };
 
 /// Star tracker and gyroscope of the chaser.
@@ -125,11 +126,11 @@ struct Leg {
     Vec3 axis{0, 0, 1};
     double speed_m_s = 0.1;
     double hold_s = 0;                                          ///< at its end, at least
-    double within_m = std::numeric_limits<double>::infinity();  ///< the hold lasts until the estimate is so near
+    double within_m = std::numeric_limits<double>::infinity();  ///< the hold lasts until the estimate is this close
     bool contact = false;         ///< continues at this speed until contact; the last leg only
     bool look_at_target = false;  ///< x towards the target's port origin; otherwise the docked attitude
-    /// Powered descent instead: from the estimated state to `to_m` in so many seconds after the leg's start, to
-    /// arrive with `end_velocity_m_s`, without acceleration.
+    /// Powered descent instead: from the estimated state to `to_m` in this many seconds after the leg's start,
+    /// arriving with `end_velocity_m_s` and without acceleration.
     std::optional<double> descent_s;
     Vec3 end_velocity_m_s{};
 };
@@ -137,20 +138,20 @@ struct Leg {
 struct Navigation {
     std::string scene;  ///< path of the scene as the navigation knows it: with a map in place of the ground
     double map_sigma_m = 0,
-           map_correlation_m = 0;              ///< errors of its heights, and over which distance they are alike
+           map_correlation_m = 0;              ///< errors of its heights, and their correlation length
     std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
     CameraMethod camera_method = CameraMethod::features;
     std::vector<std::string> velocimeters;  ///< LiDARs whose velocities come over CAN, beside the others
     double period_s = 1;                    ///< of measurements and of control
-    /// Process noise beside that of the thrusters, which the filter knows by itself, m^2 s^-3 and rad^2 s^-3.
+    /// Process noise in addition to that of the thrusters, which the filter adds itself, m^2 s^-3 and rad^2 s^-3.
     double acceleration_psd = 1e-10, angular_acceleration_psd = 1e-14;
     double abort_sigma_m = 2;  ///< aborts at this position uncertainty
-    double abort_lost_s = 20;  ///< or after so long without a measurement
-    double abort_off_m = 5;    ///< or so far off the reference
+    double abort_lost_s = 20;  ///< or after this long without a measurement
+    double abort_off_m = 5;    ///< or this far off the reference
 };
 
-/// What the navigation believes of the world, and the emulator does not render: errors of its model, vectors along
-/// (1, 1, 1). Its estimators take `told` times these values for standard deviations.
+/// Errors of the navigation's model of the world, which the emulator does not render; vectors are along (1, 1, 1).
+/// The estimators take `told` times these values as standard deviations.
 struct ModelError {
     ModelUncertainty error;
     double told = 1;
@@ -170,8 +171,8 @@ struct Fault {
         thruster_off,    ///< the group along `axis` does not fire
         thruster_stuck,  ///< it fires all the time
         attitude_bias,   ///< the attitude sensor is turned by `value` (deg, body axes)
-        target_rate,     ///< the target's rate changes by `value` (deg/s, body axes)
-        commands_lost,   ///< no actuator command gets through
+        target_rate,     ///< the target's rate is changed by `value` (deg/s, body axes)
+        commands_lost,   ///< no actuator command is delivered
         throttle_stuck,  ///< the engine burns with its least force whenever it burns
     };
     Kind kind{};
@@ -180,25 +181,25 @@ struct Fault {
     Vec3 value{};
 };
 
-/// Requirements; a gate that is absent is not judged.
+/// Requirements; an absent gate is not judged.
 struct Gates {
     struct Corridor {
         double half_angle_deg = 10,
-               radius_m = 0.5;  ///< a cone about the port's x axis that is this wide at the port
-        double from_m = 20;     ///< judged nearer than this
+               radius_m = 0.5;  ///< a cone about the port's x axis with this radius at the port
+        double from_m = 20;     ///< judged at ranges below this
     };
     struct NavigationError {
         double sigmas = 4;    ///< |error| of each of the six, in standard deviations as sent on CAN
         double share = 0.99;  ///< of the estimates that are within
-        double position_m = std::numeric_limits<double>::infinity();  ///< largest error once it has measured
+        double position_m = std::numeric_limits<double>::infinity();  ///< largest error after the first measurement
         double attitude_deg = std::numeric_limits<double>::infinity();
     };
     std::optional<Corridor> corridor;
     std::optional<double> keep_out_m;  ///< sphere about the target's port that only the corridor may enter
     std::optional<std::pair<double, double>> distance_m;  ///< of the ports' origins, all the time
     std::optional<NavigationError> navigation;
-    std::optional<CaptureEnvelope> contact;  ///< asks for contact
-    std::optional<LandingLimits> landing;    ///< asks for a landing
+    std::optional<CaptureEnvelope> contact;  ///< requires contact
+    std::optional<LandingLimits> landing;    ///< requires a landing
     bool complete = true;                    ///< all legs flown, without an abort
 };
 
@@ -216,7 +217,7 @@ struct Scenario {
     Start start;
     Thrusters thrusters;
     std::optional<Engine> engine;
-    std::optional<LandingGear> gear;  ///< it lands
+    std::optional<LandingGear> gear;  ///< set: the chaser lands
     AttitudeSensor attitude_sensor;
     std::vector<Leg> legs;
     Navigation navigation;
@@ -227,16 +228,16 @@ struct Scenario {
 
     /// The target's attitude at time 0, body axes to world axes: the scene's.
     Quat q_world_target{};
-    /// The attractor's, which keeps it: the scene's.
+    /// The attractor's attitude, which is constant: the scene's.
     Quat q_world_attractor{};
 
-    /// Largest, of the engine or of a force group.
+    /// Largest thrust, of the engine or of a force group.
     [[nodiscard]] double thrust_n() const { return engine ? engine->most_n : thrusters.force_n; }
     [[nodiscard]] std::int64_t period_ns() const;  ///< of navigation and control
     [[nodiscard]] std::int64_t pose_period_ns() const;
     /// The time that the legs and their holds take at their speeds; may exceed duration_s.
     [[nodiscard]] double legs_duration_s() const;
-    /// The same, at most duration_s: for a progress display.
+    /// legs_duration_s(), at most duration_s: for a progress display.
     [[nodiscard]] double nominal_duration_s() const { return std::min(legs_duration_s(), duration_s); }
 };
 

@@ -16,7 +16,7 @@ namespace narpa::rehearsal {
 namespace {
 
 constexpr double kLongest_s = 1e6;
-/// Twice that of an orbit just above a body of 22 g/cm^3, denser than any.
+/// Twice the rate of an orbit just above a body of 22 g/cm^3, denser than any known.
 constexpr double kFastestOrbit_rad_s = 5e-3;
 constexpr Range kAngle_deg{.low = -360, .high = 360};
 
@@ -66,7 +66,7 @@ void read_orbit(TableReader& root, Orbit& orbit) {
     table->finish();
 }
 
-/// Ends with the table's reader: the target has more keys.
+/// Returns the table's reader: the target has more keys.
 std::optional<TableReader> read_vehicle(TableReader& root, const char* name, const Scene& scene, Vehicle& v) {
     root.require(name, fmt::format("a table [{}]", name));
     auto table = root.table(name);
@@ -202,7 +202,7 @@ void read_legs(TableReader& root, std::vector<Leg>& legs) {
     }
 }
 
-/// Sensors that the chaser navigates by: they are in the scene, and on the chaser.
+/// Reads the sensors that the chaser navigates by; they must be in the scene and on the chaser.
 template <class Sensor>
 std::vector<std::string> read_sensors(TableReader& table, const char* key, const std::vector<Sensor>& sensors,
                                       const Scene& scene, const std::string& chaser) {
@@ -235,7 +235,7 @@ bool same_names(const std::vector<Named>& a, const std::vector<Named>& b) {
     return std::ranges::equal(a, b, {}, &Named::name, &Named::name);
 }
 
-/// Another scene with the same bodies and sensors, of which only the shapes differ.
+/// Reads the map: another scene with the same bodies and sensors, of which only the shapes differ.
 std::string read_map(TableReader& table, const Scene& scene) {
     const auto map = table.text("map");
     if (!map) return "";
@@ -404,7 +404,7 @@ void read_gates(TableReader& root, Scenario& s) {
     table->finish();
 }
 
-/// The scene that the scenario plays in; null where it cannot be read.
+/// Reads the scenario's scene; null if it cannot be read.
 std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problems) {
     root.require("scenario", "a table [scenario]");
     auto table = root.table("scenario");

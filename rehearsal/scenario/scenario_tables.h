@@ -8,7 +8,7 @@
 
 namespace narpa::rehearsal {
 
-/// Sets `value` where the table has the key.
+/// Sets `value` if the table has the key.
 inline void read(TableReader& table, std::string_view key, double& value, const Range& range = kAnyNumber) {
     value = table.number(key, range).value_or(value);
 }
@@ -19,11 +19,11 @@ inline void read(TableReader& table, std::string_view key, bool& value) {
     value = table.boolean(key).value_or(value);
 }
 
-// The tables of landings, in whole.
+// The tables of landings.
 
 [[nodiscard]] Engine read_engine(TableReader& table);
 [[nodiscard]] LandingGear read_gear(TableReader& table, const Scenario& s);
-/// `gates` has the table, or not.
+/// `gates` may lack the table.
 void read_landing(TableReader& gates, const Scenario& s, Gates& out);
 
 }  // namespace narpa::rehearsal

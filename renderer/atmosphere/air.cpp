@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kReference_m = 550e-9;
 
-// Ozone: the column above a height falls as a logistic function, A. Lacis, J. Hansen, J. Atmos. Sci. 31, 1974.
+// Ozone: the column above a height is a logistic function of the height, A. Lacis, J. Hansen, J. Atmos. Sci. 31,
+// 1974.
 constexpr double kOzoneMiddle_m = 20'000, kOzoneWidth_m = 5'000;
 constexpr double kDobson_1_m2 = 2.687e20;
 /// Cross-sections, m^2, of 10 nm each from 360 nm on, at 233 K: the IUP Bremen spectra of 2011 (A. Serdyuchenko et
@@ -27,12 +28,12 @@ constexpr std::array kOzone_m2{
     1.852e-25, 1.473e-25, 1.209e-25, 9.423e-26, 7.455e-26, 6.566e-26, 5.105e-26, 4.15e-26,  4.228e-26, 3.237e-26,
     2.451e-26, 2.801e-26, 2.534e-26, 1.624e-26, 1.465e-26, 2.078e-26, 1.383e-26, 7.105e-27};
 
-// Earth's aerosol: extinction as wavelength^-1.3 (A. Angstrom 1929; the exponent of A. Preetham et al., SIGGRAPH
-// 1999), asymmetry 0.76, and a tenth of it absorbed.
+// Earth's aerosol: extinction proportional to wavelength^-1.3 (A. Angstrom 1929; exponent of A. Preetham et al.,
+// SIGGRAPH 1999), asymmetry 0.76, single-scattering albedo 0.9.
 constexpr double kAngstrom = 1.3, kEarthAsymmetry = 0.76, kEarthAlbedo = 0.9;
 
-// Mars: carbon dioxide at 610 Pa and 210 K scatters this part of what Earth's air does at the surface: density,
-// squared ratio of refractivities (449e-6 / 277e-6), King's factor 1.15 to 1.05.
+// Mars: scattering coefficient of carbon dioxide at 610 Pa and 210 K relative to that of Earth's air at the
+// surface: density, squared ratio of refractivities (449e-6 / 277e-6), King's factor 1.15 to 1.05.
 constexpr double kMarsGas = 610 / (1.380649e-23 * 210) / 2.546899e25 * (449.0 / 277 * 449 / 277) * (1.15 / 1.05);
 // Dust: grey extinction, blue absorbed most, red scattered most widely: rounded from the range of retrievals from
 // Pathfinder's and Viking's images (M. Ockert-Bell et al., JGR 102, 1997; M. Tomasko et al., JGR 104, 1999).
@@ -107,7 +108,7 @@ AirBackscatter backscatter(const AirDescription& air, const AirCoefficients& at)
 
 namespace {
 
-/// Over the wavelengths that a node stands for: ozone's absorption has more structure than the nodes resolve.
+/// Mean over the node's wavelength interval, because ozone's absorption has more structure than the nodes resolve.
 double mean_ozone_absorption(const AirDescription& air, const SpectralNode& node) {
     constexpr int kSteps = 16;
     double sum = 0, weights = 0;

@@ -11,7 +11,7 @@
 
 namespace narpa {
 
-/// At one wavelength, where the density is that at the surface (ozone: at its maximum), 1/m.
+/// Coefficients at one wavelength and at surface density (ozone: at its maximum density), 1/m.
 struct AirCoefficients {
     double gas_scattering = 0;
     double aerosol_scattering = 0, aerosol_extinction = 0;
@@ -20,24 +20,24 @@ struct AirCoefficients {
 };
 [[nodiscard]] AirCoefficients coefficients(const AirDescription& air, double wavelength_m);
 
-/// Scattering straight back where the density is that at the surface, 1/(m sr).
+/// Backscatter coefficients at surface density, 1/(m sr).
 struct AirBackscatter {
     double gas = 0, aerosol = 0;
 };
 [[nodiscard]] AirBackscatter backscatter(const AirDescription& air, const AirCoefficients& at);
 
-/// A wavelength that stands for a part of one of the camera's bands (solar_bands.h).
+/// A quadrature node: a wavelength that represents part of one of the camera's bands (solar_bands.h).
 struct SpectralNode {
     double wavelength_m = 0;
     int band = 0;                 ///< 0 red, 1 green, 2 blue
-    double weight = 0;            ///< of sunlight in the band; those of a band add up to 1
-    double from_m = 0, to_m = 0;  ///< wavelengths that it stands for
+    double weight = 0;            ///< share of the band's sunlight; the weights of a band add up to 1
+    double from_m = 0, to_m = 0;  ///< interval that it represents
 };
 /// Red 580 to 680 nm, green 490 to 580, blue 400 to 490: `per_band` Gauss points of each, weighted with sunlight as
 /// a blackbody of 5772 K.
 [[nodiscard]] std::vector<SpectralNode> spectral_nodes(int per_band);
 
-/// Densities, relative: gas and aerosol to the surface's, ozone to its maximum.
+/// Relative densities: gas and aerosol relative to the surface, ozone relative to its maximum.
 struct AirDensities {
     float gas = 0, aerosol = 0, ozone = 0;
 };
@@ -59,14 +59,14 @@ public:
     [[nodiscard]] double ground_radius_m() const { return description_.ground_radius_m; }
     [[nodiscard]] double top_radius_m() const { return description_.ground_radius_m + description_.top_m; }
     [[nodiscard]] AirDensities densities(double height_m) const noexcept;
-    /// Of the layer's maximum, at a height in metres.
+    /// Density relative to the layer's maximum.
     [[nodiscard]] static float ozone_density(float height_m) noexcept;
 
-    // 1/m at reference density. For light that is scattered again the aerosol's forward peak, what is beyond
-    // kMaxDegree, is taken as no scattering (delta-M); "scaled" is the rest.
+    // Coefficients at reference density, 1/m. In multiple scattering, the aerosol's forward peak (Legendre moments
+    // above kMaxDegree) counts as unscattered light (delta-M); the "scaled" coefficients exclude it.
     Spectrum gas{}, aerosol{}, aerosol_extinction{}, ozone{}, asymmetry{};
     Spectrum scaled_aerosol{}, scaled_extinction{};
-    std::array<Spectrum, kMaxDegree + 1> moment{};  ///< Legendre moments of the rest
+    std::array<Spectrum, kMaxDegree + 1> moment{};  ///< Legendre moments of the scaled phase function
     Spectrum red{}, green{}, blue{};                ///< weights of the lanes in the bands
 
 private:

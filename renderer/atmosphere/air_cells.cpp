@@ -8,7 +8,7 @@ namespace {
 
 constexpr auto kRelaxed = std::memory_order_relaxed;
 
-/// Cheaper than mixed(), and not commutative either.
+/// Cheaper than mixed(); like it, it depends on the order of the words.
 std::uint64_t chained(std::uint64_t hash, std::uint64_t word) {
     return (hash ^ word) * 0x9e3779b97f4a7c15u + (hash >> 29);
 }
@@ -24,7 +24,7 @@ auto* bytes_of(Cell& cell) {
 
 }  // namespace
 
-bool AirCells::find(std::uint64_t key, AirCell& cell) const noexcept {
+bool AirCache::find(std::uint64_t key, AirCell& cell) const noexcept {
     const Entry& entry = entries_[key % kEntries];
     const std::uint64_t check = entry.check.load(kRelaxed), head = entry.head.load(kRelaxed);
     cell.layers = static_cast<std::uint32_t>(head);
@@ -39,7 +39,7 @@ bool AirCells::find(std::uint64_t key, AirCell& cell) const noexcept {
     return hash == check;
 }
 
-void AirCells::store(std::uint64_t key, const AirCell& cell) noexcept {
+void AirCache::store(std::uint64_t key, const AirCell& cell) noexcept {
     Entry& entry = entries_[key % kEntries];
     const std::uint64_t head = cell.layers | static_cast<std::uint64_t>(cell.differs) << 32;
     std::uint64_t hash = chained(key, head);

@@ -1,9 +1,9 @@
-/// renderer/atmosphere/air_cells.h - what air does to light along the rays from one point, in cells of directions,
-/// kept for all that look through the same cell.
+/// renderer/atmosphere/air_cells.h - cache of transmittance and in-scattering along the rays from one point, by
+/// cell of ray directions.
 ///
-/// A hash table without locks: an entry's first word is its key mixed with all of its other words, so that one that
-/// another thread is writing is not found (R. Hyatt, T. Mann, ICGA Journal 25, 2002). A cell's contents follow from
-/// its key, so what is rendered does not depend on what is found.
+/// A lock-free hash table: an entry's check word is a hash of its key and of all its other words, so an entry that
+/// another thread is writing fails the check (R. Hyatt, T. Mann, ICGA Journal 25, 2002). A cell's contents are a
+/// function of its key, so the image does not depend on which entries are found.
 #pragma once
 
 #include <array>
@@ -17,39 +17,39 @@
 
 namespace narpa {
 
-/// What air does to light along a ray.
+/// Effect of the air along a ray.
 struct AirLight {
-    Rgb transmittance{1, 1, 1};  ///< of the light that comes from its end
+    Rgb transmittance{1, 1, 1};  ///< of light from the ray's end
     Rgb in_scattering{};         ///< in the bands, for an irradiance of 1
 };
 static_assert(sizeof(AirLight) == 6 * sizeof(float));
 
-/// Written before it is read.
+/// Not initialised: written before it is read.
 struct AirCell {
-    static constexpr std::size_t kLayer = 9;  ///< nodes of a layer: three by three, u running first
-    static constexpr std::size_t kMostNodes = 2 * kLayer;
-    /// Sides along which values differ from interpolated ones.
+    static constexpr std::size_t kLayer = 9;  ///< nodes of a layer: 3 x 3, u varies fastest
+    static constexpr std::size_t kMaxNodes = 2 * kLayer;
+    /// Axes along which interpolation between the nodes is not accurate enough.
     static constexpr std::uint32_t kAlongU = 1, kAlongV = 2, kAlongHeight = 4;
-    using Nodes = UninitializedArray<AirLight, kMostNodes>;
+    using Nodes = UninitializedArray<AirLight, kMaxNodes>;
     std::uint32_t layers;
-    std::uint32_t differs;  ///< not 0: the cell is to be halved, and has no nodes
+    std::uint32_t differs;  ///< axes to subdivide; where not 0, the nodes are not set
     Nodes nodes;
 };
 
-class AirCells {
+class AirCache {
 public:
     static constexpr std::size_t kEntries = 2048;  ///< 440 bytes each
-    AirCells() : entries_(std::make_unique<Entry[]>(kEntries)) {}
+    AirCache() : entries_(std::make_unique<Entry[]>(kEntries)) {}
 
-    /// False: it is not there.
+    /// False if there is no entry for the key.
     [[nodiscard]] bool find(std::uint64_t key, AirCell& cell) const noexcept;
     void store(std::uint64_t key, const AirCell& cell) noexcept;
 
 private:
     static constexpr std::size_t kWords = sizeof(AirLight) / sizeof(std::uint64_t);
     struct Entry {
-        std::atomic<std::uint64_t> check{0}, head{0};  ///< head: layers and sides
-        std::array<std::atomic<std::uint64_t>, AirCell::kMostNodes * kWords> words{};
+        std::atomic<std::uint64_t> check{0}, head{0};  ///< head: layers and differs
+        std::array<std::atomic<std::uint64_t>, AirCell::kMaxNodes * kWords> words{};
     };
     std::unique_ptr<Entry[]> entries_;
 };

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kBelowGround_m = 1000;
 
-/// Integrals of Lagrange's polynomials of the nodes, from 0 to each node, by the same rule scaled.
+/// Integrals of the Lagrange basis polynomials from 0 to each node, by the same rule scaled to that interval.
 std::vector<float> integration_matrix(const Quadrature& q) {
     const std::size_t n = q.node.size();
     std::vector<float> matrix(n * n);
@@ -32,7 +32,7 @@ std::vector<float> integration_matrix(const Quadrature& q) {
 }
 
 void insert(PanelEnds& ends, double t, double low, double high) {
-    if (t > low && t < high && ends.n + 1 < PanelEnds::kMost) ends.t_m[ends.n++] = t;
+    if (t > low && t < high && ends.n + 1 < PanelEnds::kMax) ends.t_m[ends.n++] = t;
 }
 
 /// Where a ray crosses the cylinder of the planet's shadow, behind it.
@@ -76,7 +76,7 @@ PanelEnds panel_ends(const Air& air, const Vec3& origin, const Vec3& direction, 
         if (lowest_t - inside > 0)
             high = std::min(high, lowest_t - inside);
         else if (lowest_t + inside > 0)
-            return ends;  // it starts below
+            return ends;  // the ray starts below the ground
     }
     if (!(high > low)) return ends;
     ends.t_m[ends.n++] = low;
@@ -97,7 +97,7 @@ void fill_panel(const Air& air, const PanelRule& rule, const Vec3& origin, const
     const bool rises = along + 0.5 * (from_m + to_m) > 0;
     panel.n = n;
     for (std::size_t i = 0; i < n; ++i) {
-        // From the dense end on the length grows as the square.
+        // Quadratic spacing from the dense end.
         const float x = rises ? rule.node[i] : 1 - rule.node[i];
         const float share = rises ? x * x : 1 - x * x;
         const double t = from_m + length * static_cast<double>(share);

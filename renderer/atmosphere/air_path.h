@@ -1,4 +1,5 @@
-/// renderer/atmosphere/air_path.h - a ray's way through the air: nodes of a quadrature, and the columns up to them.
+/// renderer/atmosphere/air_path.h - quadrature nodes along a ray through the air, and the air columns up to each
+/// node.
 #pragma once
 
 #include <array>
@@ -15,8 +16,8 @@ struct AirColumns {
     float gas = 0, aerosol = 0, ozone = 0;
 };
 
-/// Gauss-Legendre nodes of a panel of a ray, and the matrix that integrates what is known at the nodes up to each
-/// of them: both exact for polynomials.
+/// Gauss-Legendre nodes for one panel of a ray, and the matrix that integrates a function given at the nodes up to
+/// each node. Both are exact for polynomials.
 class PanelRule {
 public:
     static constexpr std::size_t kMaxNodes = 32;
@@ -36,20 +37,20 @@ struct AirPanel {
     Nodes gas_before, aerosol_before, ozone_before;  ///< columns from the ray's start, metres
 };
 
-/// exp(-optical depth) from a ray's start to the nodes of a panel, with the aerosol's forward peak as no
-/// scattering.
+/// exp(-optical depth) from a ray's start to the nodes of a panel; the aerosol's forward peak counts as unscattered
+/// light.
 using PanelTransmittance = std::array<Air::Spectrum, PanelRule::kMaxNodes>;
 
-/// Up to five panels between points of a ray, in order.
+/// The ends of up to five panels along a ray, in ascending order.
 struct PanelEnds {
-    static constexpr std::size_t kMost = 6;
-    std::array<double, kMost> t_m{};
+    static constexpr std::size_t kMax = 6;
+    std::array<double, kMax> t_m{};
     std::size_t n = 0;  ///< points; 0: the ray misses the air
 };
 
-/// Where a ray (from the planet's centre, metres; unit direction) of a length enters and leaves the air, passes its
-/// lowest point, and crosses the edge of the planet's shadow, where `to_sun` is given. It ends 1 km below the
-/// surface.
+/// Panel ends of a ray of length `range_m` (origin from the planet's centre, metres; unit direction): where it
+/// enters and leaves the air, where it is lowest, and, if `to_sun` is given, where it crosses the edge of the
+/// planet's shadow. The ray ends 1 km below the surface.
 [[nodiscard]] PanelEnds panel_ends(const Air& air, const Vec3& origin, const Vec3& direction, double range_m,
                                    const Vec3* to_sun) noexcept;
 

@@ -1,7 +1,6 @@
-/// renderer/atmosphere/air_tables.h - tables of two dimensions, height and direction, that a march along a ray
-/// reads.
+/// renderer/atmosphere/air_tables.h - two-dimensional tables over height and direction, read by the ray march.
 ///
-/// Heights are told by the distance to the horizon, m, of which every table has equal steps.
+/// The height axis is the distance to the horizon, m, in equal steps.
 #pragma once
 
 #include <algorithm>
@@ -15,16 +14,16 @@
 
 namespace narpa {
 
-/// How finely the tables are made, and rays are marched.
+/// Resolution of the tables and of the ray march.
 struct AirResolution {
-    int steps = 12;               ///< quadrature nodes of a panel of a ray: PanelRule
+    int steps = 12;               ///< quadrature nodes per panel of a ray (PanelRule)
     int heights = 16, suns = 32;  ///< of the table of scattered light
-    int directions = 10;          ///< above and below the horizon each, times 8 azimuths
+    int directions = 10;          ///< above and below the horizon each, times 9 azimuths
     int column_heights = 64, column_angles = 256;
-    int most_orders = 40;
+    int max_orders = 40;
 };
 
-/// The direct light that arrives at a point.
+/// Direct sunlight at a point: the air columns that it crosses.
 struct SunBeam {
     AirColumns columns;
     float visible;  ///< part of the disc above the horizon
@@ -32,23 +31,25 @@ struct SunBeam {
 
 class AirTables {
 public:
-    /// Fills the table of columns; that of scattered light is dark. `sun_radius_rad`: half of its angular diameter.
+    /// Fills the table of columns; the table of scattered light is zero. `sun_radius_rad`: half of its angular
+    /// diameter.
     AirTables(const Air& air, const AirResolution& resolution, double sun_radius_rad);
 
     /// Columns to space. `horizon_m`: to the horizon; `cosine` of the zenith angle, not below the horizon's.
     [[nodiscard]] AirColumns to_space(float radius_m, float horizon_m, float cosine) const noexcept;
     [[nodiscard]] SunBeam sun_beam(float radius_m, float horizon_m, float sun_cosine) const noexcept;
 
-    /// Four entries of the table of scattered light around a height and an elevation of the Sun, and their weights.
+    /// The four entries of the table of scattered light around a height and a solar elevation, with interpolation
+    /// weights.
     struct Corners {
         const float* at[4];  ///< [harmonic][lane]
         float weight[4];
     };
     [[nodiscard]] Corners corners(float horizon_m, float sun_cosine) const noexcept;
-    /// Irradiance of the ground between two elevations of the Sun.
+    /// Irradiance of the ground, interpolated between two solar elevations.
     [[nodiscard]] Air::Spectrum ground_irradiance(float sun_cosine) const noexcept;
 
-    /// Of the entries of the table of scattered light.
+    /// Height and cosine of the solar zenith angle of the entries of the table of scattered light.
     [[nodiscard]] double height_m(const Air& air, std::size_t i) const;
     [[nodiscard]] double sun_cosine(std::size_t j) const;
     /// Offset of an entry in `moments`.
@@ -67,14 +68,14 @@ public:
     float sun_radius;
     std::vector<float> columns;     ///< [height][angle][gas, aerosol, ozone, 0]
     std::vector<float> moments;     ///< [height][sun][harmonic][lane]
-    std::vector<float> brightness;  ///< [height][sun]: logarithm of the mean radiance's sum over lanes, inverse
+    std::vector<float> brightness;  ///< [height][sun][2]: log and inverse of the mean radiance summed over lanes
     std::vector<float> irradiance;  ///< [sun][lane]: of the ground
 
 private:
     void fill_columns(const Air& air);
 };
 
-/// Between entries of an axis of `n` equal steps from 0 to 1.
+/// Position on an axis of `n` equally spaced entries from 0 to 1.
 struct AxisCell {
     std::size_t index;
     float fraction;
@@ -85,9 +86,9 @@ inline AxisCell axis_cell(float x, std::size_t n) noexcept {
     return {i, clamped - static_cast<float>(i)};
 }
 
-/// The least cosine of the Sun's zenith angle: 23.6 degrees below the horizon.
+/// Minus the lowest tabulated cosine of the Sun's zenith angle: 23.6 degrees below the horizon.
 constexpr float kLowestSun = 0.4f;
-/// Place of an elevation of the Sun on its axis: dense at the horizon.
+/// Table coordinate of a solar elevation, 0 to 1; entries are dense at the horizon.
 inline float sun_coordinate(float sun_cosine) noexcept {
     return sun_cosine >= 0 ? 0.5f + 0.5f * std::sqrt(sun_cosine)
                            : 0.5f - 0.5f * std::sqrt(-sun_cosine / kLowestSun);
@@ -100,7 +101,7 @@ inline float disc_above(float x) noexcept {
     return 0.5f + (x * std::sqrt(1 - x * x) + std::asin(x)) * static_cast<float>(std::numbers::inv_pi);
 }
 
-/// By the distance to the top (E. Bruneton, F. Neyret, EGSR 2008).
+/// Parametrised by the distance to the top (E. Bruneton, F. Neyret, EGSR 2008).
 inline AirColumns AirTables::to_space(float radius_m, float from_horizon_m, float cosine) const noexcept {
     const float rise = (top_m - radius_m) * (top_m + radius_m), b = radius_m * cosine;
     const float to_top = rise / (b + std::sqrt(std::max(0.0f, b * b + rise)) + 1e-3f);
@@ -125,8 +126,8 @@ inline SunBeam AirTables::sun_beam(float radius_m, float from_horizon_m, float s
     return beam;
 }
 
-/// In twilight the light falls by orders of magnitude from one elevation of the Sun to the next: its brightness is
-/// interpolated geometrically, and what is relative to it linearly.
+/// In twilight the light falls by orders of magnitude between entries: brightness is interpolated geometrically,
+/// and radiance relative to the brightness linearly.
 inline AirTables::Corners AirTables::corners(float from_horizon_m, float sun_cosine) const noexcept {
     const auto [i, fi] = axis_cell(from_horizon_m / horizon_m, heights);
     const auto [j, fj] = axis_cell(sun_coordinate(sun_cosine), suns);

@@ -10,15 +10,15 @@ namespace {
 
 const Quadrature kChapmanNodes = gauss_legendre(32);
 
-/// To infinity, from a start where the ray does not descend: the integral of exp(-height) ds over the length s in
-/// scale heights. Heights come from (s^2 + 2 x s cos) / (r + x), which does not cancel.
+/// Column to infinity along a ray that does not descend: the integral of exp(-height) ds, lengths in scale heights.
+/// Heights come from (s^2 + 2 x s cos) / (r + x), which avoids cancellation.
 double rising_column(double x, double cosine) {
-    // The height that a ray gains in s is 30 at most where nothing counts any more.
+    // The integral stops 40 scale heights above the start; the rest is negligible.
     constexpr double kEnd = 40;
     const double end =
         kEnd * (kEnd + 2 * x) / (x * cosine + std::sqrt(x * x * cosine * cosine + kEnd * (kEnd + 2 * x)));
     double sum = 0;
-    // s = end t^2: dense where the air is.
+    // s = end t^2: nodes are dense where the air is dense.
     for (std::size_t i = 0; i < kChapmanNodes.node.size(); ++i) {
         const double t = kChapmanNodes.node[i], s = end * t * t;
         const double gained = s * s + 2 * x * s * cosine;

@@ -1,4 +1,4 @@
-/// renderer/atmosphere/fast_exp.h - exp in single precision, for loops that become vector instructions.
+/// renderer/atmosphere/fast_exp.h - exp in single precision, for vectorised loops.
 #pragma once
 
 #include <bit>
@@ -11,7 +11,7 @@ namespace narpa {
 /// exp(x) for x <= 0, within 3e-7 of it relatively; 0 below -87.
 [[nodiscard]] inline float exp_of_negative(float x) noexcept {
     const float t = (x < -87.0f ? -87.0f : x) * 1.44269504f;
-    const auto whole = static_cast<std::int32_t>(t - 0.5f);  // towards zero: the nearest one
+    const auto whole = static_cast<std::int32_t>(t - 0.5f);  // truncation of t - 0.5 <= 0 rounds t to nearest
     const float f = t - static_cast<float>(whole);           // in [-0.5, 0.5]
     float p = 1.5403530e-4f;
     p = p * f + 1.3333558e-3f;
@@ -24,8 +24,8 @@ namespace narpa {
     return x < -87.0f ? 0.0f : p * power;
 }
 
-/// Eight numbers at once, for loops that are too long for the compiler to make vectors of. By reference: a function
-/// that returns or takes one has another ABI on each instruction set.
+/// Eight floats in a SIMD vector, for loops too long for the compiler to vectorise. Passed by reference: passing or
+/// returning a vector by value has a different ABI on each instruction set.
 using Vector8 = float __attribute__((vector_size(32)));
 inline void load(const float* from, Vector8& to) noexcept {
     std::memcpy(&to, from, sizeof to);
@@ -33,7 +33,7 @@ inline void load(const float* from, Vector8& to) noexcept {
 inline void store(const Vector8& v, float* to) noexcept {
     std::memcpy(to, &v, sizeof v);
 }
-/// The same numbers as one by one.
+/// Same results as the scalar version.
 inline void exp_of_negative(const Vector8& x, Vector8& out) noexcept {
     using Int8 = std::int32_t __attribute__((vector_size(32)));
     const Vector8 t = (x < -87.0f ? Vector8{} - 87.0f : x) * 1.44269504f;

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t kControlPoints = 6, kTurbidities = 10;
 
-/// Of sunlight outside the atmosphere, W m^-2: E. Bruneton's averages of ASTM G-173 over 10 nm, with the colour
-/// matching functions of C. Wyman et al., JCGT 2(2), 2013. Times 683 lm / W: 133.3 klx.
+/// Linear sRGB of sunlight outside the atmosphere, W m^-2: E. Bruneton's averages of ASTM G-173 over 10 nm, with
+/// the colour matching functions of C. Wyman et al., JCGT 2(2), 2013. Times 683 lm / W: 133.3 klx.
 constexpr std::array kSunRgb{213.411, 190.885, 183.254};
 
 std::array<double, kControlPoints> bernstein(double x) {
@@ -22,7 +22,8 @@ std::array<double, kControlPoints> bernstein(double x) {
             10 * y * y * x * x * x, 5 * y * x * x * x * x, x * x * x * x * x};
 }
 
-/// Quintic in the cube root of the elevation, linear in turbidity and albedo. `stride`: coefficients side by side.
+/// Quintic in the cube root of the elevation, linear in turbidity and albedo. `stride`: coefficients per control
+/// point.
 double blended(const double* table, std::size_t stride, std::size_t coefficient, double turbidity, double albedo,
                const std::array<double, kControlPoints>& weights) {
     const auto low = std::min(static_cast<std::size_t>(turbidity), kTurbidities);

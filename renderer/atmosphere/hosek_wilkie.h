@@ -1,6 +1,6 @@
-/// renderer/atmosphere/hosek_wilkie.h - the clear sky that L. Hosek and A. Wilkie fitted to path-traced ones: "An
-/// Analytic Model for Full Spectral Sky-Dome Radiance", ACM Transactions on Graphics 31(4), 2012. From the ground
-/// alone, with the Sun above the horizon.
+/// renderer/atmosphere/hosek_wilkie.h - the clear-sky model that L. Hosek and A. Wilkie fitted to path-traced
+/// skies: "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Transactions on Graphics 31(4), 2012. For
+/// observers on the ground and a Sun above the horizon.
 #pragma once
 
 #include <array>
@@ -18,9 +18,9 @@ public:
     /// horizon: as at it. `zenith_rad` from the zenith, `to_sun_rad` from the Sun.
     [[nodiscard]] std::array<double, 3> xyz(double zenith_rad, double to_sun_rad) const noexcept;
 
-    /// In the camera's bands, of a Sun whose irradiance above the air is 1 in each: linear sRGB over that of
-    /// sunlight outside the atmosphere (ASTM G-173's spectrum), as bands (red 580 to 680 nm, ...) are near those of
-    /// sRGB.
+    /// Radiance in the camera's bands for a Sun of irradiance 1 in each band above the air: linear sRGB divided by
+    /// that of extraterrestrial sunlight (ASTM G-173 spectrum), because the bands (red 580 to 680 nm, ...) are
+    /// close to those of sRGB.
     [[nodiscard]] Rgb radiance(double zenith_cosine, double sun_cosine) const noexcept;
 
 private:

@@ -3,8 +3,8 @@
 
 namespace narpa {
 
-/// Of X, Y and Z: [albedo 0, 1][turbidity 1..10][control point][coefficient], and [albedo][turbidity][control
-/// point].
+/// First index: X, Y, Z. Layout of the second: [albedo 0, 1][turbidity 1..10][control point][coefficient], and
+/// [albedo][turbidity][control point].
 extern const double kHosekWilkieShape[3][1080];
 extern const double kHosekWilkieRadiance[3][120];
 

@@ -19,7 +19,7 @@ double LidarAir::transmittance(const Vec3& origin, const Vec3& direction, double
                       at_ground_.ozone_absorption * static_cast<double>(c.ozone)));
 }
 
-double LidarAir::most_1_m() const noexcept {
+double LidarAir::max_1_m() const noexcept {
     return std::numbers::pi * (back_.gas + back_.aerosol);
 }
 
@@ -34,7 +34,7 @@ LidarAir::Coefficients LidarAir::at(const Vec3& position) const noexcept {
 
 LidarAir::Return LidarAir::backscattered(const Vec3& origin, const Vec3& direction, double from_m,
                                          double to_m) const noexcept {
-    // Nodes of Gauss in 1 / r, over which the integrand is beta T^2.
+    // Gauss-Legendre nodes in 1 / r: with this substitution the integrand is beta T^2.
     constexpr std::array kNodes{0.069431844202973712, 0.33000947820757187, 0.66999052179242813,
                                 0.93056815579702629};
     constexpr std::array kWeights{0.17392742256872693, 0.32607257743127307, 0.32607257743127307,

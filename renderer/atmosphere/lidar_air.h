@@ -1,9 +1,9 @@
-/// renderer/atmosphere/lidar_air.h - what the air makes of a LiDAR's beam: it dims it, and sends some of it back.
+/// renderer/atmosphere/lidar_air.h - attenuation and backscatter of a LiDAR's beam by the air.
 ///
 /// The lidar equation: of a pulse of energy E, air at a range r sends back E beta(r) T(r)^2 A / r^2 per metre onto
-/// an aperture A, where a diffuse surface of reflectivity rho sends E rho / pi T^2 A / r^2. So air is told in units
-/// of such a surface's rho T^2 / r^2: pi beta T^2 / r^2 per metre. (U. Wandinger in C. Weitkamp (ed.), Lidar,
-/// Springer 2005, chapter 1.)
+/// an aperture A; a diffuse surface of reflectivity rho sends back E rho / pi T^2 A / r^2. The return of the air is
+/// therefore expressed in units of that surface's rho T^2 / r^2: pi beta T^2 / r^2 per metre. (U. Wandinger in C.
+/// Weitkamp (ed.), Lidar, Springer 2005, chapter 1.)
 #pragma once
 
 #include "base/vec3.h"
@@ -16,20 +16,20 @@ public:
     /// `steps` of the march along a beam.
     LidarAir(const AirDescription& description, double wavelength_m, int steps);
 
-    /// One way.
+    /// One-way transmittance.
     [[nodiscard]] double transmittance(const Vec3& origin, const Vec3& direction, double range_m) const noexcept;
 
     struct Return {
         double light = 0;    ///< integral of pi beta T^2 / r^2
-        double range_m = 0;  ///< its mean
+        double range_m = 0;  ///< mean range, weighted with the light
     };
-    /// Of the air between two ranges, 0 < from_m < to_m, of a beam that starts in the air. The optical depth up to
-    /// there is that of densities at the start, half-way and there (Simpson): for ranges that are short beside the
-    /// heights in which these fall.
+    /// Return of the air between two ranges, 0 < from_m < to_m, for a beam that starts in the air. The optical
+    /// depth up to a range uses the densities at the start, half-way and at that range (Simpson's rule): valid for
+    /// ranges that are short compared with the scale heights.
     [[nodiscard]] Return backscattered(const Vec3& origin, const Vec3& direction, double from_m,
                                        double to_m) const noexcept;
-    /// pi beta at the ground, 1/m: the most.
-    [[nodiscard]] double most_1_m() const noexcept;
+    /// Upper bound of pi beta: its value at the ground, 1/m.
+    [[nodiscard]] double max_1_m() const noexcept;
 
 private:
     struct Coefficients {

@@ -11,10 +11,10 @@ constexpr float kInv4Pi = 0.0795774715f;
 
 constexpr std::size_t kBlock = 8;
 
-/// The aerosol's part of the scattering below which only degree 2 counts.
+/// Ratio of aerosol to gas scattering below which degree 2 suffices.
 constexpr float kClear = 2e-3f;
 
-/// Where a node stands: height, distance to the horizon, cosine of the Sun's zenith angle.
+/// Position of a node: radius, distance to the horizon, cosine of the Sun's zenith angle.
 struct Place {
     float radius, horizon, sun;
 };
@@ -24,7 +24,8 @@ inline Place place_of(const AirTables& t, const AirPanel& p, std::size_t k, cons
     return {radius, std::sqrt(h * (2 * t.ground_m + h)), std::min(1.0f, std::max(-1.0f, sun))};
 }
 
-/// Legendre polynomials over 4 pi, times 2 l + 1. Of the peak folded with itself the sum converges in so many more.
+/// (2 l + 1) / (4 pi) times the Legendre polynomial of each degree l. The series of the peak convolved with itself
+/// converges within kPeakTerms terms beyond kMaxDegree.
 constexpr std::size_t kPeakTerms = 20;
 using LegendreTerms = std::array<float, kMaxDegree + 1 + kPeakTerms>;
 inline void legendre_terms(float nu, LegendreTerms& out) noexcept {
@@ -37,21 +38,22 @@ inline void legendre_terms(float nu, LegendreTerms& out) noexcept {
     }
 }
 
-/// Mean of the folded peaks for light that is scattered into the ray once at least, by Poisson's distribution about
-/// `a`, the optical depth of the peak before and after; more folds count as the most.
+/// Mean of the self-convolved peaks for light that the peak scatters at least once. The number of scatterings is
+/// Poisson-distributed with mean `a`, the optical depth of the peak before and after the node; more than kMaxFolds
+/// count as kMaxFolds.
 inline void mean_fold(const AerosolPhase& p, std::size_t block, const Vector8& a, Vector8& out) noexcept {
     constexpr float kThin = 1e-3f;
     const Vector8 depth = a < kThin ? Vector8{} + kThin : a;
     Vector8 weight, folded, sum{};
     exp_of_negative(-depth, weight);
     Vector8 left = 1 - weight;
-    for (std::size_t n = 0; n + 1 < AerosolPhase::kMostFolds; ++n) {
+    for (std::size_t n = 0; n + 1 < AerosolPhase::kMaxFolds; ++n) {
         weight *= depth * (1 / static_cast<float>(n + 1));
         left -= weight;
         load(&p.folded[n][block], folded);
         sum += weight * folded;
     }
-    load(&p.folded[AerosolPhase::kMostFolds - 1][block], folded);
+    load(&p.folded[AerosolPhase::kMaxFolds - 1][block], folded);
     const Vector8 mean = (sum + left * folded) / depth;
     load(&p.folded[0][block], folded);
     out = a < kThin ? folded : mean;
@@ -71,8 +73,8 @@ NARPA_EACH_ISA void attenuate(const Air& air, const AirPanel& p, PanelTransmitta
     }
 }
 
-/// Moments of the peak: 1 up to kMaxDegree, then g^k. Folded once it is what the phase function has beyond the
-/// rest.
+/// Legendre moments of the normalised peak: 1 up to degree kMaxDegree, then g^k, k = degree - kMaxDegree - 1.
+/// folded[0], the peak itself, is the phase function minus its truncated series.
 NARPA_EACH_ISA void set_phase(const Air& air, float sun_nu, bool exact, AerosolPhase& phase) noexcept {
     const std::size_t lanes = air.lanes();
     LegendreTerms terms;
@@ -93,7 +95,7 @@ NARPA_EACH_ISA void set_phase(const Air& air, float sun_nu, bool exact, AerosolP
         phase.peak[l] = air.aerosol[l] - air.scaled_aerosol[l];
         phase.folded[0][l] = (all - rest[l]) / std::max(phase.peak[l], 1e-30f);
     }
-    constexpr std::size_t kMore = AerosolPhase::kMostFolds - 1;
+    constexpr std::size_t kMore = AerosolPhase::kMaxFolds - 1;
     for (std::size_t block = 0; block < lanes; block += kBlock) {
         Vector8 g, power[kMore], sum[kMore];
         load(&air.asymmetry[block], g);
@@ -110,9 +112,9 @@ NARPA_EACH_ISA void set_phase(const Air& air, float sun_nu, bool exact, AerosolP
     }
 }
 
-NARPA_EACH_ISA void add_once(const AirTables& t, const Air& air, const AirPanel& p,
-                             const PanelTransmittance& through, const AirRay& ray, const AerosolPhase& phase,
-                             Air::Spectrum& out) noexcept {
+NARPA_EACH_ISA void add_single_scattering(const AirTables& t, const Air& air, const AirPanel& p,
+                                          const PanelTransmittance& through, const AirRay& ray,
+                                          const AerosolPhase& phase, Air::Spectrum& out) noexcept {
     const std::size_t lanes = t.lanes;
     Air::Spectrum sum = out;
     const float nu = ray.sun_nu, gas_phase = 0.0596831037f * (1 + nu * nu);
@@ -142,8 +144,9 @@ NARPA_EACH_ISA void add_once(const AirTables& t, const Air& air, const AirPanel&
     out = sum;
 }
 
-NARPA_EACH_ISA void add_again(const AirTables& t, const Air& air, const AirPanel& p,
-                              const PanelTransmittance& through, const AirRay& ray, Air::Spectrum& out) noexcept {
+NARPA_EACH_ISA void add_multiple_scattering(const AirTables& t, const Air& air, const AirPanel& p,
+                                            const PanelTransmittance& through, const AirRay& ray,
+                                            Air::Spectrum& out) noexcept {
     const std::size_t lanes = t.lanes;
     Air::Spectrum sum = out;
     for (std::size_t k = 0; k < p.n; ++k) {
@@ -152,7 +155,7 @@ NARPA_EACH_ISA void add_again(const AirTables& t, const Air& air, const AirPanel
         const float wx = (ray.sun_nu - wz * at.sun) / std::sqrt(std::max(1e-8f, 1 - at.sun * at.sun));
         const AirTables::Corners c = t.corners(at.horizon, at.sun);
         const float gas = p.length_m[k] * p.gas[k], aerosol = p.length_m[k] * p.aerosol[k];
-        // High above the aerosol Rayleigh's degree suffices.
+        // Well above the aerosol, degree 2 (Rayleigh) suffices.
         const bool clear = air.scaled_aerosol[0] * aerosol < kClear * air.gas[0] * gas;
         const std::size_t degrees = clear ? 2 : kMaxDegree;
         Harmonics y;

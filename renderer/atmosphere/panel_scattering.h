@@ -8,28 +8,28 @@ namespace narpa {
 /// A ray relative to the planet and the Sun.
 struct AirRay {
     float radius_m;                ///< of its start
-    float up, sun_cosine, sun_nu;  ///< there: cosines of ray and zenith, Sun and zenith, ray and Sun
+    float up, sun_cosine, sun_nu;  ///< cosines at the start: ray and zenith, Sun and zenith, ray and Sun
 };
 
-/// The aerosol's scattering of sunlight into a ray: what is kept of its phase function when that is cut off at
-/// kMaxDegree, and the forward peak. Light that the peak has scattered n times has the peak folded n times.
+/// The aerosol's scattering of sunlight into a ray: the phase function truncated at kMaxDegree, and the forward
+/// peak. For light that the peak has scattered n times, the peak is convolved n times with itself.
 struct AerosolPhase {
-    static constexpr std::size_t kMostFolds = 5;
-    Air::Spectrum rest{};  ///< times scattering, 1/m
-    bool exact = false;    ///< with the peak; else it counts as no scattering
-    Air::Spectrum peak{};  ///< its scattering, 1/m
-    std::array<Air::Spectrum, kMostFolds> folded{};
+    static constexpr std::size_t kMaxFolds = 5;
+    Air::Spectrum rest{};  ///< truncated phase function times scattering coefficient, 1/(m sr)
+    bool exact = false;    ///< includes the peak; else the peak counts as unscattered light
+    Air::Spectrum peak{};  ///< scattering coefficient of the peak, 1/m
+    std::array<Air::Spectrum, kMaxFolds> folded{};
 };
 /// `sun_nu`: cosine of ray and Sun.
 void set_phase(const Air& air, float sun_nu, bool exact, AerosolPhase& phase) noexcept;
 
 /// Transmittance from the ray's start to the panel's nodes.
 void attenuate(const Air& air, const AirPanel& p, PanelTransmittance& through) noexcept;
-/// Adds sunlight scattered into the ray on a panel.
-void add_once(const AirTables& t, const Air& air, const AirPanel& p, const PanelTransmittance& through,
-              const AirRay& ray, const AerosolPhase& phase, Air::Spectrum& out) noexcept;
-/// Adds light of the table scattered into the ray on a panel.
-void add_again(const AirTables& t, const Air& air, const AirPanel& p, const PanelTransmittance& through,
-               const AirRay& ray, Air::Spectrum& out) noexcept;
+/// Adds single scattering: sunlight scattered into the ray on a panel.
+void add_single_scattering(const AirTables& t, const Air& air, const AirPanel& p, const PanelTransmittance& through,
+                           const AirRay& ray, const AerosolPhase& phase, Air::Spectrum& out) noexcept;
+/// Adds multiple scattering: the table's light scattered into the ray on a panel.
+void add_multiple_scattering(const AirTables& t, const Air& air, const AirPanel& p,
+                             const PanelTransmittance& through, const AirRay& ray, Air::Spectrum& out) noexcept;
 
 }  // namespace narpa

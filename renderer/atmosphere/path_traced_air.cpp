@@ -61,7 +61,8 @@ public:
 private:
     double uniform() { return std::uniform_real_distribution<double>()(random_); }
 
-    /// Distance to the near side of a sphere about the centre from outside; never: inf.
+    /// Distance to the near side of a sphere about the planet's centre, from outside; infinite if the ray misses
+    /// it.
     static double to_sphere(const Vec3& p, const Vec3& d, double radius) {
         const double b = dot(p, d), c = dot(p, p) - radius * radius, discriminant = b * b - c;
         if (discriminant < 0 || b > 0) return kNever;
@@ -69,7 +70,8 @@ private:
         return t > 0 ? t : kNever;
     }
 
-    /// To the next collision, the ground, or never. The majorant is that of the lowest height ahead.
+    /// Distance to the next collision or the ground; infinite if the ray escapes. The majorant is the extinction at
+    /// the lowest height ahead.
     double flight(const Vec3& p, const Vec3& d, double ground) {
         const double top = description_.ground_radius_m + description_.top_m;
         const double along = dot(p, d), reach = std::sqrt(std::max(0.0, along * along - dot(p, p) + top * top));
@@ -78,7 +80,7 @@ private:
         double t = std::max(0.0, -along - reach);
         const double end = std::min(leaves, ground);
         while (t < end) {
-            // Piece by piece, so that the majorant is close.
+            // In pieces of 10 km, for a tight majorant.
             const double piece = std::min(end, t + 10'000);
             const double lowest = std::clamp(-along, t, piece);
             const double h = std::max(0.0, norm(p + lowest * d) - description_.ground_radius_m);
@@ -105,7 +107,7 @@ private:
         if (to_sphere(p, to_sun_, description_.ground_radius_m) != kNever) return 0;
         const double r = norm(p), zenith = std::acos(std::clamp(dot(p, to_sun_) / r, -1.0, 1.0));
         const double top = description_.ground_radius_m + description_.top_m;
-        // Chapman's columns go on to infinity: less what lies above the top.
+        // Chapman's columns extend to infinity: the part above the top is subtracted.
         const double exit = std::asin(std::min(1.0, r * std::sin(zenith) / top));
         double depth = 0;
         for (const auto& [height, extinction] : {std::pair{description_.gas_height_m, c_.gas_scattering},
@@ -121,7 +123,7 @@ private:
         return std::exp(-depth);
     }
 
-    double rayleigh_cosine() {  // inverse of its distribution, by Cardano
+    double rayleigh_cosine() {  // inverse of its CDF, by Cardano's formula
         const double q = 4 * uniform() - 2, root = std::cbrt(q + std::sqrt(q * q + 1));
         return root - 1 / root;
     }

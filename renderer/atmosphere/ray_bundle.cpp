@@ -12,21 +12,23 @@ namespace narpa {
 namespace {
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-/// Bundles of fewer rays are not worth the nodes; nor are cells.
+/// Bundles, and cells, with fewer rays are integrated ray by ray, because their nodes would cost more.
 constexpr std::size_t kFewest = 12;
 constexpr double kFewestInCell = 26;
-constexpr int kMostHalvings = 24;
-/// Undivided cells: their number along a tangent of one, along an octave of ranges and of tangents above the
-/// horizon, from the tangent at which the air begins to fall in inverse proportion; and the height of layers.
+constexpr int kMaxHalvings = 24;
+/// Undivided cells: their number per unit tangent, per octave of range, and per octave of the tangent above the
+/// horizon; the tangent above which the cells are spaced logarithmically, because the air column falls in inverse
+/// proportion there; the height of layers.
 constexpr double kPerTangent = 8, kPerRangeOctave = 2, kPerTangentOctave = 4, kLowTangent = 0.04, kLayer_m = 256;
-/// Ends below this height above the ground, and not too far below the ground, count as there.
-constexpr double kNearGround_m = 10'000, kMostBelowGround_m = 500;
-/// Ends so near to a layer stand on it.
+/// Ray ends between these heights above and below the ground count as near the ground.
+constexpr double kNearGround_m = 10'000, kMaxBelowGround_m = 500;
+/// Ray ends this close to a layer count as on it.
 constexpr double kOnLayer_m = 0.5;
-/// Of the brightest band, and of what passes a vacuum: what is fainter need not agree as well.
+/// Floors of the relative comparison, as a fraction of the brightest band and of a transmittance of 1: fainter
+/// values may differ more.
 constexpr float kFaintest = 1e-3f, kFaintestThrough = 1e-2f;
 
-/// The binary logarithm, with a straight line from each power of two to the next; its inverse.
+/// Piecewise linear approximation of log2, exact at powers of two; its inverse.
 constexpr std::int64_t kOne = 1023LL << 52;
 double octaves(double x) noexcept {
     return static_cast<double>(std::bit_cast<std::int64_t>(x) - kOne) * 0x1p-52;
@@ -35,7 +37,7 @@ double from_octaves(double n) noexcept {
     return std::bit_cast<double>(static_cast<std::int64_t>(n * 0x1p52) + kOne);
 }
 
-/// v of a tangent above the horizon, negative below, and its inverse.
+/// Coordinate v of a tangent above the horizon (negative below), and the inverse.
 double from_tangent(double x) noexcept {
     return std::copysign(kPerTangentOctave * octaves(1 + std::abs(x) / kLowTangent), x);
 }
@@ -48,7 +50,7 @@ std::int32_t floor_of(double x) noexcept {
     return i - (x < i ? 1 : 0);
 }
 
-/// Steps of a cell's side in that of an undivided one.
+/// Number of divided cells per undivided cell along one axis.
 double steps(std::int8_t halvings) noexcept {
     return static_cast<double>(1 << halvings);
 }
@@ -63,18 +65,18 @@ float brightest(const Rgb& light) noexcept {
     return std::max({light.x, light.y, light.z});
 }
 
-/// Of three equally spaced nodes, in the parabola through them.
+/// Weights of three equally spaced nodes in quadratic interpolation.
 std::array<float, 3> parabola(float x) noexcept {
     return {(1 - x) * (1 - 2 * x), 4 * x * (1 - x), x * (2 * x - 1)};
 }
 
-/// A place in a cell, 0 to 1 along its sides.
+/// Position in a cell, 0 to 1 along each axis.
 struct InCell {
     float u, v, layer;
 };
 using PaddedLight = std::array<float, 8>;
 
-/// `nodes`: those of a cell.
+/// Interpolates the nodes of one cell.
 NARPA_EACH_ISA void blend(const PaddedLight* __restrict nodes, std::size_t layers, const InCell& at,
                           PaddedLight& __restrict out) noexcept {
     const std::array<float, 3> wu = parabola(at.u), wv = parabola(at.v);
@@ -92,7 +94,7 @@ NARPA_EACH_ISA void blend(const PaddedLight* __restrict nodes, std::size_t layer
     for (std::size_t k = 0; k < 3; ++k) out[k] = through[k];
 }
 
-/// A cell with its nodes as blend() wants them: the optical depth in place of the transmittance, which falls by
+/// The nodes of a cell in the form that blend() needs: optical depth in place of transmittance, which falls by
 /// orders of magnitude towards the horizon.
 class Blender {
 public:
@@ -114,7 +116,7 @@ private:
     }
 
     std::size_t layers_;
-    std::array<PaddedLight, AirCell::kMostNodes> nodes_;
+    std::array<PaddedLight, AirCell::kMaxNodes> nodes_;
 };
 
 std::uint64_t mixed(std::uint64_t hash, const Vec3& v) noexcept {
@@ -132,19 +134,19 @@ AirLight air_along(const ScatteredLight& light, const Vec3& origin, const Vec3& 
     return {transmittance_of(air, s.columns), bands_of(air, s.in_scattering)};
 }
 
-RayBundle::RayBundle(const ScatteredLight& light, const Vec3& origin, const Vec3* to_sun, AirCells& cells,
+RayBundle::RayBundle(const ScatteredLight& light, const Vec3& origin, const Vec3* to_sun, AirCache& cells,
                      float tolerance) noexcept
     : light_(light), origin_(origin), to_sun_(to_sun), cells_(cells), tolerance_(tolerance) {}
 
 void RayBundle::trace(std::span<const Ray> rays, std::span<AirLight> out) noexcept {
     rays_ = rays, out_ = out;
-    const int halvings = rays.size() < kFewest || tolerance_ <= 0 ? -1 : most_halvings();
+    const int halvings = rays.size() < kFewest || tolerance_ <= 0 ? -1 : max_halvings();
     if (halvings < 0) {
         for (std::size_t i = 0; i < rays.size(); ++i) out[i] = integrate(rays[i].direction, rays[i].range_m);
         return;
     }
     aim();
-    std::array<Index, kMost> order;
+    std::array<Index, kMax> order;
     std::size_t n = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         place(i);
@@ -156,8 +158,9 @@ void RayBundle::trace(std::span<const Ray> rays, std::span<AirLight> out) noexce
     trace(std::span(order.data(), n), {}, halvings);
 }
 
-/// Until a cell among bundles like this one holds few rays; -1: it does at first.
-int RayBundle::most_halvings() const noexcept {
+/// Number of halvings after which a cell holds about kFewestInCell rays, at this bundle's density of rays; -1 if an
+/// undivided cell holds fewer.
+int RayBundle::max_halvings() const noexcept {
     Vec3 low = rays_.front().direction, high = low;
     for (const Ray& ray : rays_) {
         const Vec3& d = ray.direction;
@@ -166,10 +169,10 @@ int RayBundle::most_halvings() const noexcept {
     }
     const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z, 1e-9}) * kPerTangent;
     const double rays = static_cast<double>(rays_.size()) / (extent * extent);
-    return static_cast<int>(std::clamp(std::floor(std::log2(rays / kFewestInCell)), -1.0, double{kMostHalvings}));
+    return static_cast<int>(std::clamp(std::floor(std::log2(rays / kFewestInCell)), -1.0, double{kMaxHalvings}));
 }
 
-/// The axes, and the part of keys that is the same for all cells.
+/// Sets the axes, and the part of the keys that all cells share.
 void RayBundle::aim() noexcept {
     up_ = normalized(origin_);
     Vec3 front = to_sun_ != nullptr ? *to_sun_ - dot(*to_sun_, up_) * up_ : Vec3{};
@@ -194,7 +197,7 @@ void RayBundle::place(std::size_t i) noexcept {
         if (r < light_.air().top_radius_m() || falls) {
             p.layer = height_m / kLayer_m;
             p.end =
-                falls && height_m > -kMostBelowGround_m && height_m < kNearGround_m ? End::ground : End::elsewhere;
+                falls && height_m > -kMaxBelowGround_m && height_m < kNearGround_m ? End::ground : End::elsewhere;
         }
     }
     const double x = dot(direction, front_), y = dot(direction, left_), z = dot(direction, up_);
@@ -210,7 +213,7 @@ void RayBundle::place(std::size_t i) noexcept {
     p.v = p.end == End::space ? from_tangent(z / std::sqrt(level2) - horizon_) : kPerRangeOctave * octaves(range_m);
 }
 
-RayBundle::Cell RayBundle::cell_of(const Place& p, const Halvings& halved) noexcept {
+RayBundle::Cell RayBundle::cell_of(const Place& p, const Subdivision& halved) noexcept {
     const double layer = p.layer * steps(halved.layer);
     const std::int32_t nearest = floor_of(layer + 0.5);
     const bool one_layer = std::abs(layer - nearest) * kLayer_m <= kOnLayer_m * steps(halved.layer);
@@ -234,7 +237,7 @@ std::uint64_t RayBundle::key(const Cell& c) const noexcept {
     return narpa::mixed(narpa::mixed(seed_, pack(c.u, c.v)), pack(c.layer, kind));
 }
 
-void RayBundle::trace(std::span<Index> set, const Halvings& halved, int more) noexcept {
+void RayBundle::trace(std::span<Index> set, const Subdivision& halved, int more) noexcept {
     for (const Index i : set) cell_[i] = cell_of(place_[i], halved);
     while (!set.empty()) {
         const Cell cell = cell_[set.front()];
@@ -274,12 +277,12 @@ void RayBundle::interpolate(std::span<const Index> set, const Cell& cell, const 
     }
 }
 
-/// The nodes, where these agree with values between them along each side. Most cells that have to be divided show
-/// it along their first.
+/// Integrates the nodes and compares interpolated with integrated values between them along each axis; `differs`
+/// tells where they disagree. Most cells that must be divided fail at the first column of nodes.
 void RayBundle::make(const Cell& cell, AirCell& out) noexcept {
     out.layers = cell.one_layer ? 1 : 2;
     out.differs = AirCell::kAlongU | AirCell::kAlongV;
-    // Columns that are not filled yet have weight 0 in what is compared; 0 times NaN would be NaN.
+    // Columns that are not filled yet have weight 0 in the comparison, but 0 * NaN is NaN.
     for (std::size_t i = 0; i < out.layers * AirCell::kLayer; ++i) out.nodes[i] = {};
     const auto fill = [&](std::size_t column) {
         for (std::size_t layer = 0; layer < out.layers; ++layer)
@@ -312,7 +315,7 @@ void RayBundle::make(const Cell& cell, AirCell& out) noexcept {
                   (out.layers == 2 && differs(0.5, 0.5, 0.5) ? AirCell::kAlongHeight : 0);
 }
 
-/// Air along the ray through a place in a cell, 0 to 1 along its sides; none where there is no such ray.
+/// Air along the ray through a position in a cell, 0 to 1 along each axis; nullopt where there is no such ray.
 std::optional<AirLight> RayBundle::at(const Cell& cell, double u, double v, double layer) noexcept {
     u = (cell.u + u) / steps(cell.halved.u), v = (cell.v + v) / steps(cell.halved.v);
     const double height_m = (cell.layer + layer) / steps(cell.halved.layer) * kLayer_m;

@@ -8,13 +8,13 @@ namespace narpa {
 [[nodiscard]] double rayleigh_cross_section_m2(double wavelength_m) noexcept;
 /// At 288.15 K and 1013.25 hPa, 1/m.
 [[nodiscard]] double rayleigh_scattering_1_m(double wavelength_m) noexcept;
-/// Of the vertical through all air above sea level at 1013.25 hPa, at 45 degrees of latitude.
+/// Of a vertical path through all air above sea level at 1013.25 hPa, at 45 degrees of latitude.
 [[nodiscard]] double rayleigh_optical_depth(double wavelength_m) noexcept;
-/// rayleigh_optical_depth over rayleigh_scattering_1_m, the same at all wavelengths: a column as long as this at
-/// sea level's density.
+/// rayleigh_optical_depth / rayleigh_scattering_1_m, the same at all wavelengths: height of the air column if all
+/// of it had the density at sea level.
 inline constexpr double kAirColumn_m = 8449.6327724132452;
 
-/// Densities per solid angle, 1/sr, of scattering by an angle of this cosine; 1 over the sphere.
+/// Phase functions of the cosine of the scattering angle, 1/sr; their integral over the sphere is 1.
 [[nodiscard]] constexpr double rayleigh_phase(double cosine) noexcept {
     return 0.059683103659460751 * (1 + cosine * cosine);  // 3 / (16 pi)
 }

@@ -13,13 +13,13 @@ double cosine_of(double sine) {
     return std::sqrt(std::max(0.0, (1 - sine) * (1 + sine)));
 }
 
-/// How far the bent ray through the object misses it: the true zenith angle at which the bent ray of this apparent
-/// one reaches the object's distance from the centre, less the object's own, as an angle at the observer.
+/// Angle at the planet's centre by which the bent ray misses the object: where the ray with this apparent zenith
+/// angle reaches the object's radius, minus where the object is.
 double miss(const RefractiveShells& shells, double apparent, double true_zenith, double range_m) {
     const BentRay ray = bend(shells, apparent);
     const double r0 = shells.observer_radius_m;
     const double radius = std::sqrt(r0 * r0 + range_m * range_m + 2 * r0 * range_m * std::cos(true_zenith));
-    const double reached = ray.turned_rad + std::asin(std::min(1.0, ray.impact_m / ray.exit_radius_m)) -
+    const double reached = ray.central_angle_rad + std::asin(std::min(1.0, ray.impact_m / ray.exit_radius_m)) -
                            std::asin(std::min(1.0, ray.impact_m / radius));
     const double wanted = std::atan2(range_m * std::sin(true_zenith), r0 + range_m * std::cos(true_zenith));
     return reached - wanted;
@@ -27,13 +27,13 @@ double miss(const RefractiveShells& shells, double apparent, double true_zenith,
 
 template <class Excess>
 double solve_zenith(const Excess& excess, double start) {
-    // The secant from below: refraction grows with the zenith angle.
+    // Bracket: refraction lifts objects by less than 0.02 rad.
     double low = std::max(0.0, start - 0.02), high = std::min(0.5 * std::numbers::pi, start);
     if (excess(high) <= 0) return high;
     double at_low = excess(low);
     if (at_low >= 0) return low;
     for (int step = 0; step < 100 && high - low > 1e-13; ++step) {
-        // Illinois: the end that stays weighs half.
+        // Secant; every third step bisects.
         const double at_high = excess(high);
         double middle = low - at_low * (high - low) / (at_high - at_low);
         if (step % 3 == 2 || !(middle > low && middle < high)) middle = 0.5 * (low + high);
@@ -53,7 +53,7 @@ RefractiveShells shells_of(const std::function<double(double)>& refractivity, do
     RefractiveShells s{ground_radius_m + observer_height_m, refractivity(observer_height_m), {}, {}};
     const double depth = top_m - observer_height_m;
     const auto height = [&](double k) { return depth * (k / count) * (k / count); };
-    // The boundaries stand between the levels, at which the profile is taken.
+    // The profile is sampled at levels; the shell boundaries lie between them.
     for (int k = 0; k < count; ++k) {
         s.top_m.push_back(height(k + 0.5));
         s.refractivity.push_back(refractivity(observer_height_m + height(k)));
@@ -82,7 +82,7 @@ BentRay bend(const RefractiveShells& shells, double apparent_zenith_rad) noexcep
         const double here = shells.refractivity[i];
         if (here != below) cross(radius, below, here);
         const double next = r0 + shells.top_m[i], q = ray.impact_m / (1 + here);
-        ray.turned_rad += std::asin(std::min(1.0, q / radius)) - std::asin(std::min(1.0, q / next));
+        ray.central_angle_rad += std::asin(std::min(1.0, q / radius)) - std::asin(std::min(1.0, q / next));
         radius = next;
         below = here;
     }

@@ -1,9 +1,9 @@
-/// renderer/atmosphere/refractive_index.h - of air, by height and by wavelength.
+/// renderer/atmosphere/refractive_index.h - refractive index of air, by height and by wavelength.
 #pragma once
 
 namespace narpa {
 
-/// Of a height.
+/// Air at a height.
 struct AirState {
     double temperature_k = 0, pressure_hpa = 0;
     int layer = 0;  ///< 0 troposphere, 1 lower stratosphere, 2 above

@@ -18,7 +18,8 @@ constexpr float kSqrt4Pi = 3.5449077f;
 /// Adds the irradiance of a surface, whose normal has the components nz along the zenith and nx towards the Sun.
 NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lanes, float nz, float nx,
                                     Air::Spectrum& out) noexcept {
-    // Of the cosine lobe: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64 (R. Ramamoorthi, P. Hanrahan, SIGGRAPH 2001).
+    // Coefficients of the clamped cosine by degree: pi, 2/3 pi, pi / 4, 0, -pi / 24, 0, pi / 64 (R. Ramamoorthi, P.
+    // Hanrahan, SIGGRAPH 2001).
     constexpr std::array kLobe{3.14159265f, 2.09439510f, 0.78539816f, 0.0f, -0.13089969f, 0.0f, 0.04908739f};
     static_assert(kLobe.size() <= kMaxDegree + 1);
     Harmonics y;
@@ -41,7 +42,7 @@ NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lan
     out = sum;
 }
 
-/// Adds what the aerosol scatters strongly forward out of the direct light, times `facing`.
+/// Adds direct light that the aerosol scatters into its forward peak, times `facing`.
 NARPA_EACH_ISA void add_forward_peak(const Air& air, const SunBeam& beam, float facing,
                                      Air::Spectrum& out) noexcept {
     const float w = facing * beam.visible;
@@ -86,7 +87,7 @@ ScatteredLight::Segment ScatteredLight::along(const Vec3& origin, const Vec3& di
     const PanelEnds ends = panel_ends(air_, origin, direction, range_m, &to_sun);
     if (ends.n < 2) return s;
     const AirTables& t = tables_;
-    // From where it enters the air: what is far away would cost digits.
+    // Starts where the ray enters the air: a distant origin would cost precision.
     const double entry = ends.t_m[0];
     const Vec3 start = origin + entry * direction;
     const double r = norm(start);
@@ -99,8 +100,8 @@ ScatteredLight::Segment ScatteredLight::along(const Vec3& origin, const Vec3& di
     for (std::size_t k = 0; k + 1 < ends.n; ++k) {
         fill_panel(air_, rule_, start, direction, ends.t_m[k] - entry, ends.t_m[k + 1] - entry, s.columns, panel);
         attenuate(air_, panel, through);
-        add_once(t, air_, panel, through, ray, phase, s.in_scattering);
-        add_again(t, air_, panel, through, ray, s.in_scattering);
+        add_single_scattering(t, air_, panel, through, ray, phase, s.in_scattering);
+        add_multiple_scattering(t, air_, panel, through, ray, s.in_scattering);
     }
     for (float& x : s.in_scattering) x = std::max(x, 0.0f);
     return s;

@@ -1,15 +1,15 @@
 /// renderer/atmosphere/scattered_light.h - sunlight that the air scatters, once and many times.
 ///
-/// Along a ray, light scattered once is integrated with the aerosol's own phase function. Light scattered before
-/// comes from a table: at each height and elevation of the Sun the radiance from all directions, as spherical
-/// harmonics to degree 8 about the zenith, even in azimuth from the Sun. Rayleigh's phase function asks for degree
-/// 2 alone; of the aerosol's, what is beyond counts as light that goes straight on (delta-M: W. Wiscombe, J. Atmos.
-/// Sci. 34, 1977), with light scattered once corrected for it, and for what that forward peak has scattered more
-/// than once: the peak folded with itself, as often as Poisson's distribution says for its optical depth along the
-/// way. T. Nakajima and M. Tanaka (JQSRT 40, 1988) have the first two terms of this, for small angles. The table is
-/// the fixed point of the equation of transfer, found by iteration: one more order of scattering and of reflection
-/// by the ground each time. The layout, two tables of two dimensions and a march at run time, is that of S.
-/// Hillaire, EGSR 2020.
+/// Single scattering is integrated along a ray with the aerosol's full phase function. Multiple scattering comes
+/// from a table: at each height and elevation of the Sun the radiance from all directions, as spherical harmonics
+/// to degree 8 about the zenith, even in azimuth from the Sun. Rayleigh's phase function needs degree 2 only; the
+/// part of the aerosol's beyond degree 8 counts as unscattered light (delta-M: W. Wiscombe, J. Atmos. Sci. 34,
+/// 1977). Single scattering is corrected for this truncation, and for repeated scattering by the forward peak: the
+/// peak is convolved with itself, and the number of scatterings is Poisson-distributed with the peak's optical
+/// depth along the path. T. Nakajima and M. Tanaka (JQSRT 40, 1988) have the first two terms of this, for small
+/// angles. The table is the fixed point of the equation of transfer, found by iteration: one more order of
+/// scattering and of reflection by the ground each time. The layout, two tables of two dimensions and a march at
+/// run time, is that of S. Hillaire, EGSR 2020.
 ///
 /// Positions are metres from the planet's centre, directions unit. The Sun's irradiance is 1.
 #pragma once
@@ -28,7 +28,7 @@ public:
     [[nodiscard]] const Air& air() const { return air_; }
 
     struct Segment {
-        Spectrum in_scattering{};  ///< that reaches the ray's start
+        Spectrum in_scattering{};  ///< light that reaches the ray's start
         AirColumns columns{};
     };
     /// Along a ray as far as range_m, which may be infinite. `to_sun`: unit.
@@ -39,8 +39,8 @@ public:
     /// To space, from the table: infinite where the ground is in the way.
     [[nodiscard]] AirColumns columns_to_space(const Vec3& origin, const Vec3& direction) const noexcept;
 
-    /// Irradiance of a surface by scattered light, ground and sky, unshadowed; with what the aerosol scatters
-    /// strongly forward out of direct sunlight.
+    /// Irradiance of a surface by light from sky and ground, unshadowed; includes direct sunlight that the aerosol
+    /// scatters into its forward peak.
     [[nodiscard]] Spectrum skylight(const Vec3& position, const Vec3& normal, const Vec3& to_sun) const noexcept;
 
     /// Mean of the radiance from all directions, scattered once or more, times 4 pi: what the air absorbs is this
@@ -48,7 +48,8 @@ public:
     [[nodiscard]] Spectrum scalar_irradiance(double height_m, double sun_cosine) const noexcept;
     /// Scattered light on the ground from above.
     [[nodiscard]] Spectrum ground_irradiance(double sun_cosine) const noexcept;
-    /// Direct light on a surface that faces the Sun, with (`scaled`) or without what is scattered strongly forward.
+    /// Irradiance by direct sunlight of a surface that faces the Sun, with (`scaled`) or without the light in the
+    /// aerosol's forward peak.
     [[nodiscard]] Spectrum sunlight(double height_m, double sun_cosine, bool scaled) const noexcept;
 
     /// Bytes of the tables.
@@ -65,7 +66,7 @@ private:
     AirTables tables_;
 };
 
-/// From a height above the ground, metres.
+/// `height_m` above the ground.
 [[nodiscard]] double distance_to_horizon_m(const Air& air, double height_m) noexcept;
 /// Bands of a spectrum.
 [[nodiscard]] Rgb bands_of(const Air& air, const Air::Spectrum& light) noexcept;

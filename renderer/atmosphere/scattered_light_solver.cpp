@@ -15,12 +15,12 @@ namespace {
 constexpr std::size_t kAzimuths = 9;
 constexpr double kConverged = 2e-5;
 
-/// A ray's way through the air, ready to be lit.
+/// Panels of a ray through the air, and the transmittance to their nodes.
 struct Way {
     PanelEnds ends;
     AirColumns columns;
-    std::array<AirPanel, PanelEnds::kMost> panels;
-    std::array<PanelTransmittance, PanelEnds::kMost> to_nodes;
+    std::array<AirPanel, PanelEnds::kMax> panels;
+    std::array<PanelTransmittance, PanelEnds::kMax> to_nodes;
 
     void fill(const Air& air, const PanelRule& rule, const Vec3& origin, const Vec3& direction) {
         columns = {};
@@ -33,7 +33,7 @@ struct Way {
 
 }  // namespace
 
-/// As in AirTables.
+/// Table contents, laid out as in AirTables.
 struct ScatteredLight::Moments {
     std::vector<float> moments, irradiance;
 };
@@ -42,12 +42,12 @@ void ScatteredLight::solve(const AirResolution& resolution) {
     Moments once{std::vector<float>(tables_.moments.size()), std::vector<float>(tables_.irradiance.size())};
     tbb::parallel_for(std::size_t{0}, tables_.heights, [&](std::size_t i) { gather(i, resolution, true, once); });
     tables_.set_scattered(once.moments, once.irradiance);
-    for (int orders = 1; orders < resolution.most_orders; ++orders)
+    for (int orders = 1; orders < resolution.max_orders; ++orders)
         if (iterate(resolution, once) < kConverged) break;
 }
 
-/// One more order of scattering, from light scattered or reflected once; returns the largest change, relative to
-/// the most.
+/// New table: `once` plus the present table scattered once more, that is one more order. Returns the largest
+/// change, relative to the largest moment.
 double ScatteredLight::iterate(const AirResolution& resolution, const Moments& once) {
     Moments next = once;
     tbb::parallel_for(std::size_t{0}, tables_.heights, [&](std::size_t i) { gather(i, resolution, false, next); });
@@ -60,8 +60,8 @@ double ScatteredLight::iterate(const AirResolution& resolution, const Moments& o
     return most > 0 ? change / most : 0;
 }
 
-/// Adds to the moments at one height: `once` sunlight scattered or reflected once, else what becomes of known
-/// light.
+/// Adds to the moments at one height: sunlight scattered or reflected once if `once`, else the tabulated light
+/// scattered or reflected once more.
 void ScatteredLight::gather(std::size_t height, const AirResolution& resolution, bool once, Moments& to) const {
     const AirTables& t = tables_;
     const std::size_t lanes = air_.lanes();
@@ -112,9 +112,9 @@ void ScatteredLight::gather(std::size_t height, const AirResolution& resolution,
                     Spectrum light{};
                     for (std::size_t k = 0; k + 1 < way->ends.n; ++k)
                         if (once)
-                            add_once(t, air_, way->panels[k], way->to_nodes[k], ray, phase, light);
+                            add_single_scattering(t, air_, way->panels[k], way->to_nodes[k], ray, phase, light);
                         else
-                            add_again(t, air_, way->panels[k], way->to_nodes[k], ray, light);
+                            add_multiple_scattering(t, air_, way->panels[k], way->to_nodes[k], ray, light);
                     if (side == 1) {
                         const double there = (r * sun + range * nu) / air_.ground_radius_m();
                         const Spectrum lit = once ? sunlight(0, there, true) : ground_irradiance(there);

@@ -8,11 +8,11 @@
 
 namespace narpa {
 
-/// Of the harmonics, and of the phase functions of light that is scattered again.
+/// Highest degree of the harmonics, and of the phase functions in multiple scattering.
 constexpr std::size_t kMaxDegree = 8, kHarmonics = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
 using Harmonics = std::array<float, kHarmonics>;
 
-/// Of the associated Legendre functions over (2 m - 1)!! sin^m, from degree to degree; norms that make the
+/// Recurrence over the degree of the associated Legendre functions divided by (2 m - 1)!! sin^m; `norm` makes the
 /// harmonics orthonormal.
 struct HarmonicRecurrence {
     Harmonics norm{}, up{}, down{};
@@ -37,8 +37,8 @@ inline constexpr HarmonicRecurrence kHarmonicRecurrence = [] {
     return r;
 }();
 
-/// The harmonics up to degree `most`, degree by degree, in each by rising order. Of a unit vector by its components
-/// along the axis (`z`) and in the direction of azimuth zero (`x`).
+/// The harmonics of a unit vector up to degree `most`, by ascending degree, then order. `z`, `x`: components along
+/// the axis and in the direction of azimuth zero.
 inline void harmonics(float z, float x, std::size_t most, Harmonics& out) noexcept {
     const float y = std::sqrt(std::max(0.0f, 1 - z * z - x * x));
     float real = 1, imaginary = 0;  // (x + i y)^m

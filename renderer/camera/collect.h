@@ -12,7 +12,7 @@
 
 namespace narpa {
 
-/// Counters of the generator that draws patterns and events, one for each use.
+/// Philox counter values, one for each use: fixed patterns and events.
 struct SensorDraw {
     static constexpr std::uint32_t kPattern = 0, kDefects = 1, kBlinking = 2, kHits = 4;
 };
@@ -119,8 +119,8 @@ inline std::array<DefectCursor, 3> defects_from(const SiteConstants& sites, std:
     return {of_band(0), of_band(1), of_band(2)};
 }
 
-/// Light to bytes, where no charge moves between photosites: of consecutive pixels from `first_pixel` on, a
-/// multiple of kLanes.
+/// Light to bytes for consecutive pixels from `first_pixel` (a multiple of kLanes) on, where no charge moves
+/// between photosites.
 inline void write_sites(const DetectorConstants& sensor, const SiteConstants& sites, PixelFormat format,
                         std::span<const Rgb> radiance, std::size_t first_pixel, std::uint8_t* out) noexcept {
     std::array<DefectCursor, 3> defects = defects_from(sites, first_pixel);
@@ -169,12 +169,13 @@ inline void read_sites(const DetectorConstants& sensor, const SiteConstants& sit
     });
 }
 
-/// Charge above the full well flows along its column of `rows` photosites, half down and then half up, until it is
-/// taken or leaves at the edge: of `columns` <= kLanes columns from `top` on, `stride` apart from row to row.
+/// Blooming: charge above the full well flows along its column of `rows` photosites, half down and then half up,
+/// until a photosite has room for it or it leaves at the edge. Handles `columns` <= kLanes columns from `top` on;
+/// rows are `stride` apart.
 inline void bloom(float* top, std::size_t stride, std::size_t rows, std::size_t columns,
                   float full_well_e) noexcept {
     Lanes<float> carried{};
-    // Downwards. What is to flow up stays above the full well until then.
+    // Downwards. The half that flows up stays in its photosite until the second pass.
     for (std::size_t y = 0; y < rows; ++y)
         for (std::size_t i = 0; i < columns; ++i) {
             float& e = top[y * stride + i];

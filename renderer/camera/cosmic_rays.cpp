@@ -24,7 +24,7 @@ double unit(std::uint32_t word) noexcept {
 /// One axis of the walk from pixel to pixel.
 struct Axis {
     int at, step;
-    double next, between;  ///< fractions of the track: at the next pixel's edge, from there to the one after
+    double next, between;  ///< as fractions of the track: position of the next pixel edge, distance between edges
 
     Axis(double start, double length) noexcept
         : at(static_cast<int>(start)),

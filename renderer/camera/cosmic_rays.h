@@ -20,8 +20,8 @@ inline constexpr double kCosmicRayElectrons_per_m = 73e6;
 [[nodiscard]] double mean_cosmic_rays(const Camera& camera) noexcept;
 
 /// Adds the charge of a frame's hits to one band's photosites, row-major, `camera.height` x `camera.width`. The
-/// number of hits is Poisson; their places are uniform; the zenith angle of those that cross a plane has
-/// P(cos < c) = c^2. Of the camera's detector, which there must be.
+/// number of hits is Poisson; their places are uniform; the zenith angle of particles that cross a plane has P(cos
+/// < c) = c^2. The camera must have a detector.
 void add_cosmic_rays(const Camera& camera, const PhiloxSchedule& random, std::uint32_t frame, std::uint32_t band,
                      std::span<float> charge_e) noexcept;
 

@@ -40,7 +40,7 @@ DarkLevels::DarkLevels(double black_dn, double read_noise_dn, std::int32_t top_d
     const std::int32_t least = within(black_dn - reach_dn), most = within(black_dn + reach_dn + 1);
     if (most - least >= static_cast<std::int32_t>(kColumns)) return;
 
-    std::array<std::uint64_t, kColumns> words{};  // of each value
+    std::array<std::uint64_t, kColumns> words{};  // probability of each value, in words
     std::uint64_t below = 0;
     for (std::int32_t dn = least; dn <= most; ++dn) {
         const std::uint64_t up_to = dn == most ? kWords : words_below((dn + 0.5 - black_dn) / read_noise_dn);
@@ -65,7 +65,7 @@ DarkLevels::DarkLevels(double black_dn, double read_noise_dn, std::int32_t top_d
         words[other] -= kColumnWords - words[v];
         if (words[other] < kColumnWords) few[n_few++] = many[--n_many];
     }
-    least_dn_ = static_cast<std::uint32_t>(least);
+    min_dn_ = static_cast<std::uint32_t>(least);
     any_ = true;
 }
 

@@ -29,12 +29,12 @@ public:
     /// DN for a uniform random word.
     [[nodiscard]] std::uint32_t level(std::uint32_t word) const noexcept {
         const std::uint32_t own = word >> 24, column = columns_[own];
-        return least_dn_ + ((word & 0xffffffu) < column >> 8 ? own : column & 0xffu);
+        return min_dn_ + ((word & 0xffffffu) < column >> 8 ? own : column & 0xffu);
     }
 
 private:
     std::array<std::uint32_t, kColumns> columns_{};  ///< threshold * 2^24 for its own value; 8 bits: the alias
-    std::uint32_t least_dn_ = 0;
+    std::uint32_t min_dn_ = 0;
     bool any_ = false;
 };
 

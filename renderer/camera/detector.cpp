@@ -58,7 +58,7 @@ DetectorConstants detector_constants(const Camera& c, std::uint64_t seed, std::u
     } else {
         set_ideal(c, s);
     }
-    const double limit_e = std::min(0x1p28 / s.dn_per_e, 0x1p120);  // of what noise.h draws
+    const double limit_e = std::min(0x1p28 / s.dn_per_e, 0x1p120);  // range of the samplers in noise.h
     for (std::size_t b = 0; b < 3; ++b)
         s.radiance_max[b] = static_cast<float>(std::min(limit_e / s.electrons_per_radiance[b], 1e30));
     s.full_well_e = std::min(s.full_well_e, limit_e);

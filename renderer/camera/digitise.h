@@ -23,8 +23,8 @@ struct DetectorConstants {
     std::array<double, 3> electrons_per_radiance{};
     std::array<float, 3> radiance_max{};  ///< of each band
     double full_well_e = 0, read_noise_e = 0, dn_per_e = 0, black_dn = 0;
-    std::int32_t top_dn = 0;   ///< of the converter
-    std::int32_t full_dn = 0;  ///< of a full well without noise, or of the converter if that is less
+    std::int32_t top_dn = 0;   ///< highest level of the converter
+    std::int32_t full_dn = 0;  ///< level of a full well without noise, at most top_dn
     int bits = 8;
     bool shot_noise = false;
     std::uint32_t frame = 0;
@@ -91,7 +91,7 @@ private:
     std::array<Band, 3> bands_;
 };
 
-/// Of pixels with light, and of dark ones where there is no table.
+/// For pixels with light, and for dark ones if there is no table.
 inline DnLanes digitise_lit(const DetectorConstants& sensor, const Lanes<double>& mean_e, bool any_light,
                             std::uint32_t first_pixel, std::uint32_t band) noexcept {
     Lanes<double> e = mean_e;
@@ -118,7 +118,7 @@ inline DnLanes digitise_dark(const DetectorConstants& sensor, const Lanes<std::u
     return dn;
 }
 
-/// A pixel's noise depends on its own signal alone, not on that of its batch.
+/// A pixel's noise depends only on its own signal, not on the rest of its batch.
 inline DnLanes digitise(const DetectorConstants& sensor, const Lanes<double>& mean_e, std::uint32_t first_pixel,
                         std::uint32_t band, DarkWords& dark_words) noexcept {
     std::uint64_t lit = 0;
@@ -141,7 +141,7 @@ inline bool is_black(const Rgb* radiance) noexcept {
     return any == 0;
 }
 
-/// How many photosites a pixel has: one, or one for each band.
+/// Photosites per pixel: one, or one for each band.
 inline std::uint32_t sites_per_pixel(PixelFormat f) noexcept {
     return f == PixelFormat::rgb24 || f == PixelFormat::yuyv ? 3 : 1;
 }
@@ -158,8 +158,8 @@ inline void mean_electrons(const DetectorConstants& sensor, bool mono, const Rgb
         for (std::size_t i = 0; i < kLanes; ++i) mean_e[0][i] = mean_e[0][i] + mean_e[1][i] + mean_e[2][i];
 }
 
-/// Of pixels of a Bayer mosaic: the bands that their places have, in the first. The image's width is even, so a
-/// pixel's column is even where its lane is.
+/// The same for a Bayer mosaic: the band of each pixel's filter, in mean_e[0]. The image's width is even, so a
+/// pixel's column is even if its lane is.
 inline void mosaic_electrons(const DetectorConstants& sensor, const Rgb* radiance, std::uint32_t first_pixel,
                              std::array<Lanes<double>, 3>& mean_e) noexcept {
     mean_electrons(sensor, false, radiance, mean_e);
@@ -172,7 +172,7 @@ inline void mosaic_electrons(const DetectorConstants& sensor, const Rgb* radianc
     }
 }
 
-/// DN of each photosite of kLanes pixels; those of one photosite use the first.
+/// DN of each photosite of kLanes pixels; formats with one photosite per pixel use dn[0] only.
 struct alignas(64) DnBands {
     std::array<DnLanes, 3> dn;
 };
@@ -192,7 +192,7 @@ inline DnBands digitise(const DetectorConstants& sensor, bool mono, const Rgb* r
     return out;
 }
 
-/// The same of a Bayer mosaic, in the first.
+/// The same for a Bayer mosaic, in dn[0].
 inline DnBands digitise_mosaic(const DetectorConstants& sensor, const Rgb* radiance, std::uint32_t first_pixel,
                                DarkWords& dark_words) noexcept {
     DnBands out;
@@ -249,7 +249,7 @@ inline std::array<std::uint32_t, kLanes / 2> to_yuyv(int bits, const DnBands& c)
     return out;
 }
 
-/// That of a mosaic's samples: GREY or Y16.
+/// The format of a mosaic's samples: GREY or Y16; of other formats, the format itself.
 inline PixelFormat sample_format(PixelFormat f) noexcept {
     return !is_bayer(f) ? f : is_16_bit(f) ? PixelFormat::y16 : PixelFormat::grey;
 }
@@ -284,7 +284,7 @@ void write_batches(PixelFormat format, std::span<const Rgb> radiance, std::size_
     }
 }
 
-/// Of a detector whose photosites are all alike, in a format without a mosaic.
+/// For a detector whose photosites are all alike, in a format without a mosaic.
 inline void write_pixels(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
                          std::size_t first_pixel, std::uint8_t* out) noexcept {
     DarkWords dark_words;
@@ -293,7 +293,7 @@ inline void write_pixels(const DetectorConstants& sensor, PixelFormat format, st
     });
 }
 
-/// The same of a Bayer mosaic. A function of its own: in one with the above, GCC compiles both worse.
+/// The same for a Bayer mosaic. A separate function, because GCC compiles both worse when they are one.
 inline void write_mosaic_pixels(const DetectorConstants& sensor, PixelFormat format, std::span<const Rgb> radiance,
                                 std::size_t first_pixel, std::uint8_t* out) noexcept {
     DarkWords dark_words;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kBands = 3;
 
-/// The share of light along a direction at so many radians from the axis.
+/// Share of the light that passes the lens at an angle from the axis, radians.
 double relative_illumination(const Vignetting& v, double theta) {
     const double s = theta * theta, cosine = std::max(0.0, std::cos(theta));
     const auto [a, b, c] = v.polynomial;
@@ -61,7 +61,7 @@ ImageOptics::ImageOptics(const Camera& camera)
     lit_.resize(static_cast<std::size_t>(height_));
 }
 
-/// The row with its vignetting and with `radius` more pixels on each side, as the border ones are.
+/// Applies vignetting to a row and extends it by `radius` pixels on each side, which repeat the border pixels.
 void ImageOptics::pad_row(const RadianceImage& in, int y) noexcept {
     const auto width = static_cast<std::size_t>(width_), first = static_cast<std::size_t>(y) * width;
     const std::span row = std::span(in.pixels).subspan(first, width);
@@ -127,7 +127,7 @@ void ImageOptics::apply(const RadianceImage& in, RadianceImage& out) noexcept {
     }
 }
 
-void ImageOptics::add_veil(RadianceImage& image) const noexcept {
+void ImageOptics::add_veiling_glare(RadianceImage& image) const noexcept {
     if (!(veil_ > 0)) return;
     const Rgb veil = veil_ * mean(image);
     for (Rgb& c : image.pixels) c = (1 - veil_) * c + veil;

@@ -1,5 +1,5 @@
-/// renderer/camera/image_optics.h - what a lens does to the image beyond its projection: vignetting, point spread
-/// and veiling glare, in this order.
+/// renderer/camera/image_optics.h - effects of a lens besides projection: vignetting, point spread and veiling
+/// glare, in this order.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,19 @@
 
 namespace narpa {
 
-/// Made once for a camera. Where the camera names none of it, nothing is computed and nothing kept.
+/// Constructed once per camera. If the camera has none of these effects, nothing is computed or allocated.
 class ImageOptics {
 public:
     explicit ImageOptics(const Camera& camera);
 
     [[nodiscard]] bool any() const noexcept { return any_; }
-    /// Vignetting and point spread; where there is neither, a copy. Both images have the camera's size and are not
-    /// the same. Beyond the border the image is taken to go on as it ends. Same bytes on any number of threads;
-    /// allocates nothing; runs on the calling thread's TBB arena. Rows without light cost nothing.
+    /// Applies vignetting and point spread; copies if there is neither. Both images have the camera's size and are
+    /// distinct. Beyond the border, the border pixels are repeated. Same bytes on any number of threads; allocates
+    /// nothing; runs on the calling thread's TBB arena. Rows without light cost nothing.
     void apply(const RadianceImage& in, RadianceImage& out) noexcept;
-    /// Veiling glare of the light that the image has by now; then it is what reaches the detector.
-    void add_veil(RadianceImage& image) const noexcept;
+    /// Adds veiling glare, computed from the image's present light: the last step but the Sun's ghost before the
+    /// detector.
+    void add_veiling_glare(RadianceImage& image) const noexcept;
     /// Share of the light that vignetting leaves at the pixel nearest to an image point.
     [[nodiscard]] float gain_at(const ImagePoint& p) const noexcept;
 
@@ -40,7 +41,7 @@ private:
     bool any_ = false;
     int width_ = 0, height_ = 0;
     float veil_ = 0;           ///< share of the light that is spread over the whole image
-    std::vector<float> gain_;  ///< of each pixel; empty: 1
+    std::vector<float> gain_;  ///< vignetting of each pixel; empty: 1
     SeparableFilter filter_;
     std::vector<Rgb> padded_, rows_;  ///< the image with its borders, and filtered along x
     std::vector<Extent> lit_;         ///< of each row of `rows_`

@@ -18,20 +18,20 @@ namespace narpa {
     return lens.aperture_diameter_m * focal_px * std::abs(1 / lens.focus_distance_m - 1 / depth_m);
 }
 
-/// Where a ray passes the lens: the point of the aperture for (u, v) in [0, 1)^2, even in area; camera axes,
-/// metres.
+/// Point of the aperture for (u, v) in [0, 1)^2, uniform in area; camera axes, metres.
 [[nodiscard]] inline Vec3 aperture_point(const Lens& lens, double u, double v) {
     const auto [x, y] = concentric_disc(u, v);
     const double radius_m = 0.5 * lens.aperture_diameter_m;
     return {radius_m * x, radius_m * y, 0};
 }
 
-/// Direction, in camera axes, from a point of the aperture to where the chief ray, that through the lens's centre,
-/// meets the plane of focus. `chief`: any length, z > 0.
+/// Direction, in camera axes, from a point of the aperture to where the chief ray (through the lens's centre) meets
+/// the plane of focus. `chief`: any length, z > 0.
 [[nodiscard]] inline Vec3 lens_direction(const Lens& lens, const Vec3& chief, const Vec3& from) {
     return normalized(chief / chief.z - from / lens.focus_distance_m);
 }
-/// The chief ray that meets a ray from this point of the aperture in the plane of focus: the inverse, of z = 1.
+/// Inverse of lens_direction: the chief ray, with z = 1, that meets the ray from this point of the aperture in the
+/// plane of focus.
 [[nodiscard]] inline Vec3 chief_direction(const Lens& lens, const Vec3& direction, const Vec3& from) {
     return direction / direction.z + from / lens.focus_distance_m;
 }

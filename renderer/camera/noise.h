@@ -1,8 +1,7 @@
 /// renderer/camera/noise.h - standard normals and Poisson counts for batches of kLanes pixels.
 ///
-/// Lanes are independent and without branches, so that the loops become vector code; logarithm, sine and cosine are
-/// written out for that reason. The polynomials are minimax fits; the bound beside each is that of its weighted
-/// error.
+/// Lanes are independent and branch-free so that the loops vectorise; logarithm, sine and cosine are written out
+/// for that reason. The polynomials are minimax fits; the bound beside each is that of its weighted error.
 #pragma once
 
 #include <bit>
@@ -21,7 +20,7 @@ inline float minus_log(std::uint32_t word) noexcept {
     const std::uint32_t bits = std::bit_cast<std::uint32_t>(static_cast<float>(word) + 0.5f);
     const std::int32_t e = static_cast<std::int32_t>(bits - kSqrtHalf) >> 23;
     const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(e) << 23));
-    // Near u = 1 the rounding of u would dominate 1 - u: it is formed from the integer.
+    // Near u = 1 the rounding of u would dominate 1 - u, so 1 - u is formed from the integer.
     const float one_less = -(static_cast<float>(static_cast<std::int32_t>(~word)) + 0.5f) * 0x1p-32f;
     const float f = e == 32 ? one_less : m - 1;
     // ln(1 + f) = f - f^2 / 2 + f^3 p(f), p to 4e-8 |f|^-2.
@@ -77,7 +76,7 @@ inline Lanes<double> uniforms(const RandomLanes& random) noexcept {
     return out;
 }
 
-/// From this mean on counts are drawn by the normal approximation.
+/// Counts with this mean or more are drawn by the normal approximation.
 inline constexpr double kPoissonExactBelow = 32;
 
 /// Poisson counts of means in [0, kPoissonExactBelow) by inversion of the distribution function, which is accurate
@@ -93,10 +92,10 @@ inline Lanes<double> exact_poisson(const Lanes<double>& mean, const Lanes<double
     for (int n = 0; n < 6; ++n)
         for (std::size_t i = 0; i < kLanes; ++i) p[i] *= p[i];
     sum = p;
-    // The bound, 13 standard deviations above the largest mean, ends sums that rounding keeps below `uniform`.
-    // Lanes that are done do not change; whether all are is tested every few steps.
-    constexpr int kMost = 112, kStride = 4;
-    for (int k = 0; k < kMost; k += kStride) {
+    // kMax, 13 standard deviations above the largest mean, ends sums that rounding keeps below `uniform`. Finished
+    // lanes do not change; whether all are finished is tested every kStride steps.
+    constexpr int kMax = 112, kStride = 4;
+    for (int k = 0; k < kMax; k += kStride) {
         for (int step = 1; step <= kStride; ++step) {
             const double part = 1.0 / (k + step);
             for (std::size_t i = 0; i < kLanes; ++i) {
@@ -125,7 +124,7 @@ inline double normal_poisson(double mean, float normal) noexcept {
 /// Poisson counts of means >= 0. Each method runs only if a lane needs it.
 inline Lanes<double> poisson(const Lanes<double>& mean, const NormalLanes& normal,
                              const RandomLanes& random) noexcept {
-    std::uint64_t lit = 0, bright = 0;  // how many
+    std::uint64_t lit = 0, bright = 0;  // number of lanes
     for (std::size_t i = 0; i < kLanes; ++i) {
         lit += mean[i] > 0 ? 1u : 0u;
         bright += mean[i] >= kPoissonExactBelow ? 1u : 0u;

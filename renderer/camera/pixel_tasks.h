@@ -1,5 +1,5 @@
-/// renderer/camera/pixel_tasks.h - an image in tasks of whole batches of kLanes pixels, side by side on the calling
-/// thread's TBB arena.
+/// renderer/camera/pixel_tasks.h - splits an image into parallel tasks of whole batches of kLanes pixels, on the
+/// calling thread's TBB arena.
 #pragma once
 
 #include <tbb/blocked_range.h>

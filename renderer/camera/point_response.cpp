@@ -12,17 +12,17 @@ namespace narpa {
 namespace {
 
 constexpr int kSteps = PointResponse::kSteps;
-constexpr double kPeriod_px = 128;     ///< on which the response is computed
-constexpr double kHighest = 8;         ///< cycles a pixel
-constexpr double kHighestOfImage = 3;  ///< of a point spread from an image
-constexpr int kMostRadius = kPointSpreadReach_px;
+constexpr double kPeriod_px = 128;     ///< period on which the response is computed
+constexpr double kHighest = 8;         ///< cycles per pixel
+constexpr double kHighestOfImage = 3;  ///< the same for a point spread given as an image
+constexpr int kMaxRadius = kPointSpreadReach_px;
 
 double sinc(double x) {
     return x == 0 ? 1 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
 }
 
-/// Beyond it is 0.2 % of the light at most: of a Gaussian exp(-r^2 / 2 sigma^2), of an aperture about 2 / (pi^2
-/// cutoff r).
+/// Radius beyond which at most 0.2 % of the light falls: of a Gaussian exp(-r^2 / 2 sigma^2), of an aperture about
+/// 2 / (pi^2 cutoff r).
 int radius_of(const PointSpreadFunction& spread, double disc_px) {
     double radius = 3.5 * spread.sigma_px + 0.5 * disc_px;
     if (spread.cutoff_per_px > 0) radius += 101 / spread.cutoff_per_px;
@@ -31,23 +31,23 @@ int radius_of(const PointSpreadFunction& spread, double disc_px) {
         radius += std::max({i.centre_x, i.width - 1 - i.centre_x, i.centre_y, i.height - 1 - i.centre_y}) /
                   spread.samples_per_px;
     }
-    return static_cast<int>(std::ceil(std::min<double>(radius, kMostRadius - 1))) + 1;
+    return static_cast<int>(std::ceil(std::min<double>(radius, kMaxRadius - 1))) + 1;
 }
 
-/// The transfer function of an evenly lit disc, f cycles a pixel: 2 J1(pi d f) / (pi d f).
+/// Transfer function of a uniform disc at f cycles per pixel: 2 J1(pi d f) / (pi d f).
 double disc_transfer(double disc_px, double f) {
     const double x = std::numbers::pi * disc_px * f;
     return x < 1e-6 ? 1 : 2 * ::j1(x) / x;
 }
 
-/// The lens without the image of its point spread, which is the part that is not symmetric.
+/// The point spread without its image, the only part that may be asymmetric.
 PointSpreadFunction symmetric_part(PointSpreadFunction spread) {
     spread.image = nullptr;
     return spread;
 }
 
-/// The highest frequency that carries anything, in units of 1 / kPeriod_px. A disc's fall with f^-1.5: it is sharp
-/// to 2 % of its edge.
+/// The highest frequency with a significant transfer, in units of 1 / kPeriod_px. A disc's transfer falls with
+/// f^-1.5; the limit for it keeps its edge sharp to 2 %.
 int highest_frequency(const PointSpreadFunction& spread, double disc_px) {
     double highest = kHighest;
     if (disc_px > 0) highest = std::min(highest, 27 / disc_px);
@@ -58,8 +58,8 @@ int highest_frequency(const PointSpreadFunction& spread, double disc_px) {
     return k;
 }
 
-/// A pixel's share of the light of a point in its middle: of lens and pixel, at frequencies (kx, ky) >= 0. A box of
-/// 1/8 px smooths what the highest frequency cuts off.
+/// Spectrum of the light that a pixel receives from a point at its centre: lens times pixel, at frequencies (kx,
+/// ky) >= 0. A box of 1/8 px suppresses ringing from the cut-off at the highest frequency.
 cv::Mat1d symmetric_spectrum(const PointSpreadFunction& spread, double disc_px, int n) {
     const PointSpreadFunction symmetric = symmetric_part(spread);
     const auto pixel = [](double f) { return sinc(f) * sinc(f / kHighest) / kPeriod_px; };
@@ -74,7 +74,7 @@ cv::Mat1d symmetric_spectrum(const PointSpreadFunction& spread, double disc_px, 
     return spectrum;
 }
 
-/// e^(2 pi i k x / kPeriod_px) for each place x and each k of low .. high.
+/// e^(2 pi i k x / kPeriod_px) for each position x and each k of low .. high.
 cv::Mat2d waves(const std::vector<double>& x_px, int low, int high) {
     cv::Mat2d out(static_cast<int>(x_px.size()), high - low + 1);
     for (int row = 0; row < out.rows; ++row)
@@ -85,9 +85,9 @@ cv::Mat2d waves(const std::vector<double>& x_px, int low, int high) {
     return out;
 }
 
-/// The Fourier sum of the image at frequencies (0 .. n, -n .. n), as `transfer` has it.
+/// Fourier sum of the image at frequencies (0 .. n, -n .. n), with the sign convention of `transfer`.
 cv::Mat2d image_spectrum(const PointSpreadImage& image, double samples_per_px, int n) {
-    std::vector<double> x, y;  // against the direction of the samples: the sum has e^(-2 pi i f x)
+    std::vector<double> x, y;  // negated, because the sum has e^(-2 pi i f x)
     for (int i = 0; i < image.width; ++i) x.push_back((image.centre_x - i) / samples_per_px);
     for (int j = 0; j < image.height; ++j) y.push_back((image.centre_y - j) / samples_per_px);
     cv::Mat2d samples(image.height, image.width);
@@ -97,8 +97,8 @@ cv::Mat2d image_spectrum(const PointSpreadImage& image, double samples_per_px, i
     return cv::Mat(waves(y, -n, n).t() * samples * waves(x, 0, n));
 }
 
-/// A pixel's share of the light of a point, by its place (x, y) from the point in steps, from -last to last: the
-/// inverse Fourier transform of lens times pixel.
+/// Share of a point's light that a pixel receives, by the pixel's offset (x, y) from the point in steps, from -last
+/// to last: the inverse Fourier transform of lens times pixel.
 cv::Mat1d shares(const PointSpreadFunction& spread, double disc_px, int last) {
     const int n = highest_frequency(spread, disc_px);
     const cv::Mat1d symmetric = symmetric_spectrum(spread, disc_px, n);

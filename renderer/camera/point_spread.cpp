@@ -8,12 +8,12 @@
 namespace narpa {
 namespace {
 
-constexpr int kGrid = 128;  ///< pixels of the period on which the filter is computed
+constexpr int kGrid = 128;  ///< period on which the filter is computed, pixels
 constexpr double kLightBeyond = 2e-3;
-/// Terms are added until what is missing is below this share of the largest.
-constexpr double kLeastTerm = 1e-4;
+/// Terms are added while their singular value exceeds this share of the largest.
+constexpr double kMinTerm = 1e-4;
 
-/// Over a period of kGrid pixels, its middle at (0, 0).
+/// The filter over a period of kGrid pixels, centred on (0, 0).
 cv::Mat1d periodic_filter(const PointSpreadFunction& spread) {
     cv::Mat2d spectrum(kGrid, kGrid);
     for (int j = 0; j < kGrid; ++j)
@@ -47,9 +47,9 @@ int radius_of(const cv::Mat1d& periodic) {
     }
 }
 
-/// What is beyond the widest filter goes to its outer parts, as the square of the distance: only the transfer of
-/// the lowest frequencies changes. To scale the filter instead would change that of all, by up to 1.7 times as
-/// much.
+/// Distributes the light beyond the widest filter over the filter, weighted with the squared distance from its
+/// centre: this changes only the transfer of the lowest frequencies. Scaling the filter instead would change all
+/// frequencies, by up to 1.7 times as much.
 void add_light_beyond(cv::Mat1d& square, int radius) {
     const double beyond = 1 - cv::sum(square)[0];
     if (beyond < kLightBeyond) return;
@@ -60,7 +60,7 @@ void add_light_beyond(cv::Mat1d& square, int radius) {
     square += beyond / cv::sum(outer)[0] * outer;
 }
 
-/// Products of finite numbers, without the library's handling of infinite ones.
+/// Complex product of finite numbers, without the library's handling of infinities.
 std::complex<double> times(std::complex<double> a, std::complex<double> b) {
     return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
@@ -109,7 +109,7 @@ SeparableFilter filter_of(const PointSpreadFunction& spread) {
     const cv::SVD parts(square / cv::sum(square)[0]);
     const double largest = parts.w.at<double>(0);
     double sum = 0;
-    for (int k = 0; k < size && parts.w.at<double>(k) > kLeastTerm * largest; ++k) {
+    for (int k = 0; k < size && parts.w.at<double>(k) > kMinTerm * largest; ++k) {
         SeparableFilter::Term term;
         double columns = 0, rows = 0;
         for (int i = 0; i < size; ++i) {

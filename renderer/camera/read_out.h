@@ -1,4 +1,4 @@
-/// renderer/camera/read_out.h - which pixels a camera reads out, and which it bins.
+/// renderer/camera/read_out.h - region of interest and binning at read-out.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 namespace narpa {
 
-/// The size of the image stays. Pixels outside the region are black; in it, from its top left corner on, blocks of
-/// n x n pixels have the mean of their samples, rounded (n x 1, 1 x n and smaller at its right and lower edge), as
-/// sensors do that bin digitally. Binning is not for YUYV and mosaics: 1.
+/// The image keeps its size. Pixels outside the region are black. Within it, starting at its top left corner, each
+/// block of n x n pixels is set to the mean of its samples, rounded (blocks at the right and lower edge may be
+/// smaller), as in sensors with digital binning. YUYV and mosaics cannot be binned.
 void read_out(const VideoFormat& format, const Region& region, int binning, std::span<std::uint8_t> bytes) noexcept;
 
 /// YUYV holds black as luma 16 and chroma 128 (ITU-R BT.601), the others as zeros.

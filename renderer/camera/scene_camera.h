@@ -9,7 +9,7 @@
 
 namespace narpa {
 
-/// That of the intrinsics, whatever the camera's model is.
+/// The pinhole of the camera's intrinsics, whatever its model is.
 [[nodiscard]] inline Pinhole pinhole_of(const Camera& c) {
     return {c.fx, c.fy, c.cx, c.cy};
 }
@@ -38,10 +38,10 @@ private:
     return {T_world_camera.t, T_world_camera.q * model->direction({x, y})};
 }
 
-/// The same camera with so many times the pixels along x and y; what does not fill a whole one at the right and at
-/// the bottom is left out.
+/// The same camera with the number of pixels along x and y multiplied by these factors; incomplete pixels at the
+/// right and bottom edges are dropped.
 [[nodiscard]] Camera scaled(const Camera& camera, double factor_x, double factor_y);
-/// The same camera, of whose image a part is kept.
+/// The same camera cropped to a part of its image.
 [[nodiscard]] Camera windowed(const Camera& camera, int x, int y, int width, int height);
 
 }  // namespace narpa

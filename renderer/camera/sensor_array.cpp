@@ -98,7 +98,7 @@ void SensorArray::draw_defects(const Detector& d) {
 SiteConstants SensorArray::constants(const Detector& d, const DetectorConstants& sensor,
                                      std::uint32_t frame) const noexcept {
     // In single precision, so that the last bit of exp2, which differs between machines, has no effect. Counts stay
-    // within what noise.h draws.
+    // within the range of noise.h.
     const auto limited = [&](double e) {
         return static_cast<double>(static_cast<float>(std::min({e, 0x1p28 / sensor.dn_per_e, 1e30})));
     };

@@ -1,12 +1,12 @@
-/// renderer/camera/sensor_array.h - photosites that differ from one another, and what makes them do so: PRNU, DSNU,
-/// dark current, defects, cosmic rays, blooming. Terms after EMVA 1288, release 4.0.
+/// renderer/camera/sensor_array.h - differences between photosites: PRNU, DSNU, dark current, defects, cosmic rays,
+/// blooming. Terms after EMVA 1288, release 4.0.
 ///
-/// A photosite that light gives `m` electrons on average collects Poisson(PRNU gain * m + dark current * exposure
-/// time); cosmic rays add theirs; above the full well the charge is lost, or blooms along the column. Its offset
-/// (DSNU) and read noise are added, and the converter follows as in detector.h. Noise is that of detector.h: for
-/// the same mean it is the same.
+/// A photosite with a mean of `m` photoelectrons collects Poisson(PRNU gain * m + dark current * exposure time);
+/// cosmic rays add charge; above the full well charge is lost, or blooms along the column. The offset (DSNU) and
+/// read noise are added, and the converter follows as in detector.h. The same mean draws the same noise as in
+/// detector.h.
 ///
-/// Fixed patterns depend on (seed, camera name) alone; blinking and cosmic rays on the frame's number too.
+/// Fixed patterns depend only on (seed, camera name); blinking and cosmic rays also on the frame number.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ namespace narpa {
 struct DetectorConstants;
 struct SiteConstants;
 
-/// A photosite that is not like the others.
+/// A defective photosite.
 struct DefectSite {
     enum class Kind : std::uint8_t { dead, hot, blinking };
     std::uint32_t site;
@@ -32,11 +32,11 @@ struct DefectSite {
 
 class SensorArray {
 public:
-    /// Draws the patterns and allocates the frame's charge. Null where the detector names nothing of the above.
+    /// Draws the patterns and allocates the charge buffer. Null if the detector has none of these effects.
     [[nodiscard]] static std::unique_ptr<SensorArray> create(const Camera& camera, std::uint64_t seed);
 
-    /// The `expose` of detector.h, of the camera that this array was created for (its exposure, temperature and
-    /// noise may change). Allocates nothing.
+    /// `expose` of detector.h, for the camera that this array was created for (its exposure, temperature and noise
+    /// may change). Allocates nothing.
     void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
                 std::span<std::uint8_t> out) noexcept;
 
@@ -51,11 +51,11 @@ private:
 
     PhiloxSchedule random_;
     std::uint32_t bands_;              ///< photosites of a pixel
-    std::size_t sites_of_band_;        ///< whole batches
+    std::size_t sites_of_band_;        ///< padded to whole batches
     std::vector<float> gain_;          ///< PRNU; empty: 1 everywhere
     std::vector<float> offset_;        ///< DSNU, in standard deviations; empty: 0 everywhere
     std::vector<DefectSite> defects_;  ///< in the order of their sites
-    std::vector<float> charge_e_;      ///< of each photosite, where charge moves between them
+    std::vector<float> charge_e_;      ///< of each photosite; empty unless charge moves between them
 };
 
 }  // namespace narpa

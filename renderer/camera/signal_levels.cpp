@@ -11,12 +11,12 @@
 namespace narpa {
 namespace {
 
-/// At full scale.
+/// Signal at full scale.
 double full_electrons(const Detector& d) {
     return std::min(d.full_well_e, gain_e_per_dn(d) * (std::exp2(d.bits) - 1 - d.black_level_dn));
 }
 
-/// Fractions of full scale that radiance 1 W m^-2 sr^-1 gives in each band.
+/// Signal of radiance 1 W m^-2 sr^-1 in each band, as a fraction of full scale.
 std::array<double, 3> scale_of(const Camera& camera) {
     std::array<double, 3> scale;
     if (camera.detector) {
@@ -48,8 +48,7 @@ std::vector<double> signals(const Camera& camera, const RadianceImage& radiance)
     return out;
 }
 
-/// The smallest signal that the format's bytes tell from none: 8-bit formats have the top 8 bits of the
-/// converter's.
+/// The smallest signal that changes the bytes of the format: 8-bit formats keep the top 8 bits of the converter's.
 double darkest_step(const Camera& camera) {
     const int bits = camera.detector ? camera.detector->bits : is_16_bit(camera.format) ? 16 : 8;
     const double step_dn = is_16_bit(camera.format) ? 1 : std::exp2(bits - 8);

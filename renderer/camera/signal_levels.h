@@ -6,24 +6,24 @@
 
 namespace narpa {
 
-/// Of the mean signal of light, before noise and what makes pixels differ. In fractions of full
-/// scale: the full well or the end of the converter, whichever comes first; without a detector, white_radiance. A
-/// pixel with several bands counts by its brightest; one of a mosaic by the band of its place.
+/// Statistics of the mean photosignal, before noise and differences between pixels. In fractions of full scale: the
+/// full well or the end of the converter, whichever comes first; without a detector, white_radiance. A pixel with
+/// several bands counts by its brightest, a pixel of a mosaic by the band of its filter.
 struct SignalLevels {
     static constexpr double kLit = 0.01;
 
     double saturated_share = 0;  ///< of all pixels: at full scale or above, with dark current
     double lit_share = 0;        ///< of all pixels: above kLit times the lesser of full scale and `brightest`
-    double bright = 0;           ///< 99 % of the lit pixels are at most so bright; may exceed 1
+    double bright = 0;           ///< 99th percentile of the lit pixels; may exceed 1
     double brightest = 0;        ///< of any pixel; may exceed 1
     double dark = 0;             ///< mean dark current
-    double darkest_step = 0;     ///< less than this is 0 in the bytes of the camera's format
+    double darkest_step = 0;     ///< smaller signals are 0 in the bytes of the camera's format
 
     [[nodiscard]] bool is_black() const noexcept { return brightest < darkest_step; }
-    /// Of dark current alone half of the scale is full.
+    /// Dark current alone fills half of the scale.
     [[nodiscard]] bool is_filled_by_dark_current() const noexcept { return dark >= 0.5; }
-    /// More than a tenth of the lit pixels are saturated, and more than 0.1 % of all: glints and a few bright stars
-    /// are no mistake.
+    /// More than a tenth of the lit pixels and more than 0.1 % of all are saturated; fewer are glints and bright
+    /// stars.
     [[nodiscard]] bool is_overexposed() const noexcept {
         return saturated_share > 1e-3 && saturated_share > 0.1 * lit_share;
     }

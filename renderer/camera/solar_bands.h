@@ -1,4 +1,4 @@
-/// renderer/camera/solar_bands.h - how the three bands share sunlight.
+/// renderer/camera/solar_bands.h - each band's share of sunlight.
 #pragma once
 
 #include <array>

@@ -17,8 +17,8 @@ namespace {
 
 constexpr double kSolarV = -26.76, kSolarIrradiance_w_m2 = 1361;
 constexpr std::size_t kBuffer = 1024;                ///< segments that are traced and drawn together
-constexpr std::size_t kMostSegments = 4096;          ///< of a trail; longer ones have longer segments
-constexpr std::size_t kSegmentsOfMovingBodies = 16;  ///< at least, where bodies may pass before a star at rest
+constexpr std::size_t kMaxSegments = 4096;           ///< of a trail; longer ones have longer segments
+constexpr std::size_t kSegmentsOfMovingBodies = 16;  ///< minimum where moving bodies may pass in front of stars
 constexpr int kRowsOfTask = 8;
 constexpr double kWidestDisc_px = 60;
 
@@ -40,8 +40,8 @@ double disc_px(const Camera& camera) noexcept {
     return camera.lens ? std::min(circle_of_confusion_px(*camera.lens, camera.fx, kInfinity), kWidestDisc_px) : 0;
 }
 
-/// Points so close that their images make an even line: what they have of that frequency is below 1 %. The steps of
-/// the response are even without any blur.
+/// Points per pixel along a trail such that the trail is even: the transfer at the points' spatial frequency is
+/// below 1 %. Without any blur, one point per step of the response is even.
 double points_per_px(const PointSpreadFunction& spread) noexcept {
     for (const double n : {2.0, 4.0, 8.0})
         if (std::abs(transfer(spread, n, 0)) < 0.01) return n;
@@ -74,9 +74,9 @@ Rgb star_irradiance(double v_magnitude, double b_v) noexcept {
 }
 
 Vec3 aberrated(const Vec3& direction, const Vec3& velocity_m_s) noexcept {
-    constexpr double kMostBeta = 0.999;  // commanded poses may move faster than light
+    constexpr double kMaxBeta = 0.999;  // commanded poses may move faster than light
     Vec3 beta = velocity_m_s / kLightSpeed_m_s;
-    if (const double n = norm(beta); n > kMostBeta) beta *= kMostBeta / n;
+    if (const double n = norm(beta); n > kMaxBeta) beta *= kMaxBeta / n;
     const double inverse_gamma = std::sqrt(1 - dot(beta, beta));
     return normalized(inverse_gamma * direction + (1 + dot(direction, beta) / (1 + inverse_gamma)) * beta);
 }
@@ -87,7 +87,7 @@ StarLight::StarLight(const Scene& scene, const Camera& camera)
       model_(camera),
       response_(camera.point_spread.value_or(PointSpreadFunction{}), disc_px(camera)),
       points_per_px_(points_per_px(camera.point_spread.value_or(PointSpreadFunction{}))),
-      moments_(kMostSegments + 1),
+      moments_(kMaxSegments + 1),
       buffer_(kBuffer) {
     const double right = camera.width - 1, bottom = camera.height - 1, reach = response_.radius() + 1;
     view_ = model_->bounds({-reach, -reach, right + reach, bottom + reach});
@@ -113,7 +113,7 @@ double StarLight::set_moments(const BodyPoses& at, const CameraPose& pose) noexc
     const double turn_rad = angle_between(pose.at(0).q, pose.at(1).q) +
                             norm(field_.rate_rad_s) * std::abs(pose.seconds(1) - pose.seconds(0));
     const double length_px = std::ceil(turn_rad * px_per_rad_);
-    segments_ = static_cast<std::size_t>(std::clamp(length_px, 1.0, static_cast<double>(kMostSegments)));
+    segments_ = static_cast<std::size_t>(std::clamp(length_px, 1.0, static_cast<double>(kMaxSegments)));
     if (at.moving()) segments_ = std::max(segments_, kSegmentsOfMovingBodies);
     for (std::size_t i = 0; i <= segments_; ++i)
         moments_[i] = moment(static_cast<double>(i) / static_cast<double>(segments_));
@@ -129,11 +129,11 @@ void StarLight::add(const Tracer& tracer, const Medium* medium, const BodyPoses&
     // Aberration displaces by asin(v / c) at most.
     const double half_angle =
         view_.half_angle_rad + 0.5 * turn_rad + std::asin(std::min(norm(velocity_m_s) / kLightSpeed_m_s, 1.0));
-    const double least_cosine = half_angle < kPi ? std::cos(half_angle) : -2;
+    const double min_cosine = half_angle < kPi ? std::cos(half_angle) : -2;
     const Vec3 axis = q_icrs_world * (pose.middle().q * view_.axis);
     for (std::size_t i = 0; i < field_.stars.size(); ++i) {
         const Vec3& direction = field_.stars[i].direction;
-        if (dot(direction, axis) >= least_cosine) add_trail(aberrated(direction, velocity_m_s), irradiance_[i], f);
+        if (dot(direction, axis) >= min_cosine) add_trail(aberrated(direction, velocity_m_s), irradiance_[i], f);
     }
     flush(f);
 }

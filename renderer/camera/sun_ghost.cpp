@@ -8,7 +8,7 @@
 namespace narpa {
 namespace {
 
-constexpr double kHoodShade = 0.1;  ///< the lens hood shades the aperture bit by bit over this part of its angle
+constexpr double kHoodShade = 0.1;  ///< the lens hood shades the aperture gradually over this fraction of its angle
 
 }  // namespace
 
@@ -44,7 +44,7 @@ void SunGhost::add(const Tracer& tracer, const Medium* medium, const BodyPoses& 
     if (!middle || tracer.intersect(at, to_sun, kInfinity).body >= 0) return;
     const double cosine = (conjugate(T_world_camera.q) * sun_.direction).z;
     const double irradiance = sun_.irradiance_w_m2 * cosine * share_within_hood(std::acos(std::min(cosine, 1.0)));
-    // Of the disc whose edge add_row draws one pixel wide.
+    // Area of the disc with the one-pixel-wide edge that add_row draws.
     const double area_px = kPi * (ghost_.radius_px * ghost_.radius_px + 1.0 / 12);
     const auto grey = static_cast<float>(ghost_.strength * irradiance * model_->pixels_per_sr({0, 0, 1}) / area_px);
     const Rgb radiance = grey * (medium == nullptr ? Rgb{1, 1, 1} : medium->transmittance(at, to_sun, kInfinity));

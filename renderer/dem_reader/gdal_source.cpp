@@ -76,8 +76,8 @@ private:
     std::vector<unsigned char> mask_;
 };
 
-/// A grid that goes around the planet, with its first column again as its last, and a row at each pole that it ends
-/// half a post before: there the mean of the row beside it.
+/// A grid that goes around the planet: repeats the first column as the last, and adds a row at each pole from which
+/// it ends half a post, with the mean of the row beside it.
 class WholePlanet final : public HeightSource {
 public:
     WholePlanet(std::unique_ptr<HeightSource> map, bool first_pole, bool last_pole)
@@ -85,7 +85,7 @@ public:
 
     [[nodiscard]] int columns() const override { return map_->columns() + 1; }
     [[nodiscard]] int rows() const override { return map_->rows() + first_ + last_; }
-    [[nodiscard]] bool goes_around() const override { return true; }
+    [[nodiscard]] bool is_global() const override { return true; }
     [[nodiscard]] bool read_rows(int row, int count, double* heights) override {
         const auto width = static_cast<std::size_t>(columns());
         row_.resize(width - 1);
@@ -109,7 +109,7 @@ private:
     std::vector<double> row_;
 };
 
-/// Where the planet and its map are known.
+/// Ellipsoid and map projection of a DEM.
 class Georeference {
 public:
     Status read(GDALDatasetH file, const DemRequest& r) {
@@ -121,7 +121,7 @@ public:
         } else if (!has_map) {
             return Error{"it has no geo-reference, expected post_spacing_m"};
         } else {
-            // GDAL's are of the corners of pixels; posts are in the middle.
+            // GDAL's geotransform refers to corners of pixels; posts are at their centres.
             place_.map = {g[0] + 0.5 * (g[1] + g[2]), g[1], g[2], g[3] + 0.5 * (g[4] + g[5]), g[4], g[5]};
         }
         const double area = place_.map[1] * place_.map[5] - place_.map[2] * place_.map[4];
@@ -149,7 +149,7 @@ private:
         const bool needed = geographic_ || r.on != DemRequest::On::plane || r.radii;
         if (needed && !(a > 0 && b > 0 && a < 1e12 && b < 1e12 && b > 0.1 * a && b < 10 * a))
             return Error{"it names no ellipsoid, expected ellipsoid_m = [equatorial, polar]"};
-        // Heights stand on the ellipsoid at geodetic latitudes; a distance from the centre does neither.
+        // Heights are above the ellipsoid at geodetic latitudes; for distances from the centre neither holds.
         if (r.radii && a != b)
             return Error{fmt::format(
                 "its ellipsoid is flattened, of {:.10g} and {:.10g} m, and radii are those of a sphere: "
@@ -193,7 +193,7 @@ private:
                 return true;
             };
         }
-        find_circle();
+        find_wrap_and_poles();
         return r.on == DemRequest::On::tangent ? stand_at_middle() : Ok{};
     }
 
@@ -217,8 +217,8 @@ private:
         return true;
     }
 
-    /// Does it go around the planet, and does it end at the poles?
-    void find_circle() {
+    /// Finds whether the grid goes around the planet, and whether it ends at the poles.
+    void find_wrap_and_poles() {
         double lon0 = 0, lat0 = 0, lon1 = 0, lat1 = 0;
         const double middle = 0.5 * (rows_ - 1);
         const int column = columns_ / 2;

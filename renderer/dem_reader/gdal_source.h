@@ -1,4 +1,4 @@
-/// renderer/dem_reader/gdal_source.h - a DEM file, by GDAL.
+/// renderer/dem_reader/gdal_source.h - reads DEM files with GDAL.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace narpa {
 
-/// An open DEM and where it lies. `spacing`: between posts in the middle.
+/// An open DEM and its placement. `spacing`: between posts, in the middle of the DEM.
 struct OpenDem {
     std::unique_ptr<HeightSource> heights;
     Placement placement;

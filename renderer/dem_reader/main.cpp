@@ -15,7 +15,7 @@ namespace {
 
 using namespace narpa;
 
-/// On a terminal, how far it is: a line that is rewritten, once a hundredth.
+/// Progress on a terminal: a line that is rewritten at each per cent.
 class ProgressLine {
 public:
     ProgressLine(int terminal, const std::string& path)
@@ -36,16 +36,16 @@ Result<TerrainMesh> read_terrain(const DemRequest& request, int terminal) {
     auto dem = open_with_gdal(request);
     if (!dem) return dem.error();
     std::unique_ptr<HeightSource> detailed;
-    const int finer = request.detail.posts_per_post;
+    const int finer = request.detail.refinement_factor;
     if (finer > 1) {
         if (dem->heights->columns() > (1 << 20) / finer || dem->heights->rows() > (1 << 20) / finer)
             return Error{"it has too many posts for its detail, expected at most 2^20 along a side with it"};
-        if (dem->heights->goes_around() && (request.detail.craters > 0 || request.detail.rocks > 0))
+        if (dem->heights->is_global() && (request.detail.craters > 0 || request.detail.rocks > 0))
             return Error{
                 "it goes around the planet, where craters and rocks would break off at the seam and stretch to the "
                 "poles: expected no craters_per_m2 and no rocks_share in its detail"};
         detailed = std::make_unique<DetailedSource>(*dem->heights, dem->spacing, request.detail);
-        dem->placement.posts_per_post = finer;
+        dem->placement.refinement_factor = finer;
     }
     ProgressLine line(terminal, request.path);
     return build_terrain(detailed ? *detailed : *dem->heights, dem->placement, request.options,

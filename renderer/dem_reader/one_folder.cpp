@@ -14,7 +14,7 @@ namespace {
 struct OneFolder {
     std::string path;
 
-    /// Empty: not in it. A file with another name than its own is not looked for.
+    /// The path of a file by its plain name; empty for a name with a slash.
     [[nodiscard]] std::string file(const char* name) const {
         const std::string_view plain(name);
         return plain.empty() || plain.find('/') != plain.npos ? "" : path + "/" + std::string(plain);

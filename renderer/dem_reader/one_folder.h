@@ -1,16 +1,17 @@
-/// renderer/dem_reader/one_folder.h - a file system for GDAL that has the files of one folder and nothing else.
+/// renderer/dem_reader/one_folder.h - a virtual file system for GDAL that holds the files of one folder and nothing
+/// else.
 #pragma once
 
 #include <string>
 
 namespace narpa {
 
-/// What names in it begin with.
+/// Prefix of its file names.
 inline constexpr const char* kOneFolder = "/narpa-dem/";
 
-/// Installs it; the name by which GDAL opens this file, and finds what a label beside it names. What a file may
-/// name
-/// (`../../etc/passwd`, `/vsicurl/http://...`) is not in it: only regular files whose names have no slash are.
+/// Installs the file system and returns the name under which GDAL opens `path` and finds the files that a label
+/// names. Names such as `../../etc/passwd` or `/vsicurl/http://...` in a file cannot be opened: it holds only
+/// regular files whose names have no slash.
 std::string open_in_one_folder(const std::string& path);
 
 }  // namespace narpa

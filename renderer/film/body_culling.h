@@ -12,16 +12,16 @@
 
 namespace narpa {
 
-inline constexpr int kTileSize = 8;  ///< pixels a side
+inline constexpr int kTileSize = 8;  ///< pixels per side
 
 /// A body in the camera's frame, and the camera in the body's. Differences first, rotations then: positions may be
 /// 4e8 m from the world's origin.
 struct BodyView {
-    Vec3 camera_body;               ///< place of the camera
+    Vec3 camera_body;               ///< position of the camera
     std::array<Vec3, 3> axes;       ///< the body's, in the camera's frame
     std::array<Vec3, 3> axes_body;  ///< the camera's, in the body's frame
     Vec3 centre_camera;             ///< the body's origin
-    double rounding_m;              ///< bound of what rounding moves a ray by
+    double rounding_m;              ///< bound of a ray's displacement by rounding
 
     BodyView(const Rigid3& T_world_body, const Rigid3& T_world_camera) {
         const Vec3 apart = T_world_body.t - T_world_camera.t;
@@ -34,12 +34,12 @@ struct BodyView {
     }
 };
 
-/// Tiles of an image, corners included.
+/// A rectangle of tiles, bounds inclusive.
 struct TileRect {
     int x_first, y_first, x_last, y_last;
 };
 
-/// Cut across its longer side; more than one tile.
+/// Splits a rectangle of at least two tiles across its longer side.
 inline std::array<TileRect, 2> halves(const TileRect& r) noexcept {
     const int columns = r.x_last - r.x_first + 1, rows = r.y_last - r.y_first + 1;
     TileRect low = r, high = r;
@@ -50,7 +50,7 @@ inline std::array<TileRect, 2> halves(const TileRect& r) noexcept {
     return {low, high};
 }
 
-/// Some of the tiles of an image, a bit each.
+/// A set of tiles of an image, one bit per tile.
 class TileMask {
 public:
     TileMask(int tiles_x, int tiles_y)
@@ -73,7 +73,7 @@ public:
         return for_each_word(r, [](std::uint64_t& word, std::uint64_t bits) { return (word & bits) == bits; });
     }
 
-    /// Calls f(column, row) for each that is marked, row by row, and wipes it.
+    /// Calls f(column, row) for each marked tile, row by row, and clears it.
     template <class F>
     void drain(const F& f) noexcept {
         for (int row = row_first_; row <= row_last_; ++row)
@@ -85,7 +85,7 @@ public:
     }
 
 private:
-    /// f(word, its bits within the rectangle) until it returns false.
+    /// Calls f(word, its bits within the rectangle) until it returns false.
     template <class F>
     bool for_each_word(const TileRect& r, const F& f) noexcept {
         const auto first = static_cast<unsigned>(r.x_first), last = static_cast<unsigned>(r.x_last);
@@ -102,26 +102,27 @@ private:
     int tiles_x_, tiles_y_;
     std::size_t words_per_row_;
     std::vector<std::uint64_t> words_;
-    int row_first_, row_last_ = -1;  ///< where any is marked
+    int row_first_, row_last_ = -1;  ///< range of rows with marked tiles
 };
 
-/// A body: of a mesh the leaves of its box tree, each grown by `slack_m`; without boxes the ellipsoid `bounds`.
+/// A body's bounding volumes: the leaves of its mesh's box tree, each grown by `slack_m`; without boxes the
+/// ellipsoid `bounds`.
 struct CulledBody {
     const BodyBounds& bounds;
     std::span<const BoxNode> boxes;
     BodyView view;
     double slack_m;
 };
-/// The box about its bounds.
+/// The box around these bounds.
 [[nodiscard]] BoxNode box_about(const BodyBounds& bounds) noexcept;
 
 /// Marks the tiles that may show the body, by the projection of its boxes or of its ellipsoid. `lens` may be null.
 void mark_by_projection(const Pinhole& pinhole, const Camera& camera, const Lens* lens, const CulledBody& body,
                         TileMask& mask) noexcept;
 /// The same for any camera model. The rays of a rectangle of tiles lie in a cone about their origin
-/// (CameraModel::bounds), the parts of a body in balls: where the cone and a ball's cone are apart, the rectangle
-/// does not show it. Whichever of the two is wider is divided further, down to single tiles and the leaves of the
-/// box tree. Looser and slower than the projection.
+/// (CameraModel::bounds), the parts of a body in spheres: if the cone and a sphere's cone do not overlap, the
+/// rectangle does not show the sphere. The wider of the two is subdivided, down to single tiles and the leaves of
+/// the box tree. Looser and slower than the projection.
 void mark_by_cones(const CameraModel& model, const Lens* lens, const CulledBody& body, TileMask& mask) noexcept;
 
 }  // namespace narpa

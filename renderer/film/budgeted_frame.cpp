@@ -12,45 +12,46 @@ using Of = PassCosts::Of;
 using Stage = SamplePlan::Stage;
 using Tiles = FramePasses::Tiles;
 
-/// Textures are averaged over the beam that a sample has where a pixel gets so many. Centres are sampled as in a
-/// frame of two samples, so that each takes its own point of the lens and of the Sun and shows what these blur.
+/// Samples per pixel that set the footprint for texture filtering. Centres are sampled as in a frame of two
+/// samples, so that each takes its own point of the lens and of the Sun, and shows defocus and penumbrae.
 constexpr int kCentreBeam = 2, kBeamSamples = 4;
-/// Time for waking the threads and for a preempted one: the larger of this and of one in kSlackPart of the budget.
-constexpr std::int64_t kLeastSlack_ns = 300'000;
+/// Time reserved for waking the threads and for a preempted one: the larger of kMinSlack_ns and 1/kSlackPart of
+/// the budget.
+constexpr std::int64_t kMinSlack_ns = 300'000;
 constexpr std::int64_t kSlackPart = 40;
-/// Of the time left, the part of the first pass of samples beyond those of all pixels, so that there soon is an
-/// image to show, and that of each of the next.
+/// Fractions of the remaining time for the first pass beyond one sample per pixel, short so that there soon is an
+/// image to show, and for each later pass.
 constexpr double kFirstPart = 1.0 / 3, kNextPart = 0.85;
-/// The same of the samples of sunlight, whose cost varies more: should the pass be given up, all of that is lost.
+/// The same for sunlight samples, whose cost varies more: a pass that is given up loses all of its time.
 constexpr double kSunlightTimePart = 0.7;
-/// Of the rays left. Their number follows nearly exactly from that of the samples by Sun-only direct lighting; of
-/// paths it varies by a tenth from one pass to the next.
+/// Fractions of the remaining rays. With Sun-only direct lighting the number of samples predicts the number of rays
+/// almost exactly; with paths it varies by a tenth from one pass to the next.
 constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
-/// Largest part of the remaining rays that one sample for each pixel may be expected to take: a part of the tiles
-/// shows how many that is.
+/// Largest fraction of the remaining rays that one sample per pixel may be expected to take; the expectation comes
+/// from a sixteenth of the tiles.
 constexpr double kSure = 0.85;
 /// The coarsest image takes two rays for one pixel in 4 x 4, and for those at the edges.
 constexpr std::uint64_t kPixelsOfACoarseRay = 4;
-/// Separate direct sunlight gets samples of its own, with this part of the budget: where the budget has so many
-/// rays or samples for each pixel, and the sunlight of this part of the surfaces is separate.
+/// Separate direct sunlight gets samples of its own, with this fraction of the budget, if the budget has this many
+/// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate.
 constexpr double kSunlightPart = 0.22;
 constexpr double kRaysForSunlight = 20, kSamplesForSunlight = 6;
-constexpr double kMostlySeparate = 0.5;
-constexpr double kMostRaysOfSunlight = 2;  ///< of a sample: the camera's and the Sun's
-/// Less than this part of the budget is not worth another pass.
+constexpr double kMaxlySeparate = 0.5;
+constexpr double kMaxRaysOfSunlight = 2;  ///< per sample: the camera's and the Sun's
+/// A remainder below this fraction of the budget is not worth another pass.
 constexpr double kRest = 0.05;
-/// Of a pass: what the account can hold, 2^32, less half a sample of each pixel (SamplePlan::whole).
-constexpr double kMostSamples = 4e9;
+/// Largest pass: what the account can hold, 2^32, less half a sample for each pixel (SamplePlan::whole).
+constexpr double kMaxSamples = 4e9;
 
-/// Doubt lowers an estimate by this factor, to no less than that part of the last measurement.
-constexpr double kDoubt = 0.95, kLeastBelieved = 0.25;
-/// The time of passes of fewer samples is mostly that of their start and end: it is an upper bound only.
-constexpr std::uint64_t kLeastPieces = 1000;
+/// doubt() lowers an estimate by this factor, to no less than this fraction of the last measurement.
+constexpr double kDoubt = 0.95, kMinBelieved = 0.25;
+/// The time of smaller passes is mostly that of their start and end: an upper bound only.
+constexpr std::uint64_t kMinPieces = 1000;
 
-/// A frame begins with one sample for each pixel. Sun-only direct lighting takes the pixels' centres, plans from
-/// them and discards them where there are samples; all other light takes the first sample of each pixel's sequence
-/// and keeps it. Where direct sunlight is separate, further samples of it are planned from centres that
-/// were discarded.
+/// A frame begins with one sample per pixel. Sun-only direct lighting traces the pixel centres, plans from them,
+/// and discards them where there are samples; all other lighting takes the first sample of each pixel's sequence
+/// and keeps it. Where direct sunlight is separate, further samples of it are planned from centres that are then
+/// discarded.
 class BudgetFrame {
 public:
     BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
@@ -60,7 +61,7 @@ public:
           costs_(costs),
           budget_(settings.budget),
           start_ns_(now_ns()),
-          slack_ns_(std::max(kLeastSlack_ns, (budget_.deadline_ns - start_ns_) / kSlackPart)),
+          slack_ns_(std::max(kMinSlack_ns, (budget_.deadline_ns - start_ns_) / kSlackPart)),
           centre_settings_(by_direct_light(with_spp(settings, kCentreBeam))),
           sample_settings_(with_spp(settings, kBeamSamples)),
           centre_(make_frame(render_scene, at, camera, pose, centre_settings_)),
@@ -78,7 +79,7 @@ public:
             take_first_samples(limit());
         else
             take_first_image();
-        if (account_.step == FrameStep::nothing) {  // the pilot is no part of an image
+        if (account_.step == FrameStep::nothing) {  // the pilot pass is not part of the image
             account_.rays_discarded += account_.rays;
             account_.rays = account_.samples = 0;
         }
@@ -109,7 +110,7 @@ private:
         if (!adaptive_) passes_.make_plan(sample_, false);
     }
 
-    // What is left.
+    // Remaining budget.
     [[nodiscard]] std::uint64_t rays_left() const { return budget_.rays - std::min(budget_.rays, rays_); }
     [[nodiscard]] std::int64_t time_given() const { return budget_.deadline_ns - start_ns_; }
     [[nodiscard]] std::int64_t ns_left() const {
@@ -122,10 +123,11 @@ private:
         return l;
     }
 
-    /// Books a pass; false if it does not count. `instead`: it replaces what came before.
+    /// Accounts for a pass; false if it is incomplete and does not count. `instead`: it replaces the previous
+    /// passes.
     bool book(const PassCount& pass, const PassLimit& l, bool instead) {
         if (!pass.complete) {
-            // Where the threads were when they gave up must not decide what comes next.
+            // Deterministic: the point at which the threads gave up must not decide what comes next.
             const std::uint64_t lost = budget_.kind == Kind::rays ? l.rays : pass.rays;
             rays_ += lost;
             account_.rays_discarded += lost;
@@ -141,7 +143,7 @@ private:
         return true;
     }
 
-    /// Which tiles show something, and the G-buffer, belong to one kind of frame.
+    /// The visible tiles and the G-buffer belong to one kind of frame.
     void change_to(const Frame& f) {
         if (frame_ == &f) return;
         show();
@@ -167,7 +169,7 @@ private:
         if (which == Tiles::all) costs_.note(Of::samples, pass.samples, pass.wall_ns);
         if (!book(pass, l, which != Tiles::the_others)) return false;
         each_ = rays_each(pass);
-        mostly_separate_ = static_cast<double>(pass.separate) > kMostlySeparate * static_cast<double>(pass.met);
+        mostly_separate_ = static_cast<double>(pass.separate) > kMaxlySeparate * static_cast<double>(pass.met);
         if (which == Tiles::a_sixteenth) return true;
         account_.step = FrameStep::one_sample;
         to_show_ = ToShow::means;
@@ -190,7 +192,7 @@ private:
         }
         return false;
     }
-    /// Leaves an image to show, by direct light.
+    /// Takes the centres, which give a direct-light image to show, and plans the sunlight samples from them.
     bool plan_sunlight() {
         if (!take_centres(1, 0, FrameStep::no_indirect)) return false;
         const std::int64_t start = now_ns();
@@ -198,7 +200,7 @@ private:
         costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
         return sunlight_planned_ = true;
     }
-    /// The uniform passes must have two samples for each pixel, or the error of paths is not known.
+    /// Two samples per pixel are needed to estimate the error of paths.
     [[nodiscard]] bool two_samples_fit() const {
         const auto pixels = static_cast<double>(passes_.pixels());
         switch (budget_.kind) {
@@ -233,8 +235,8 @@ private:
     }
     [[nodiscard]] bool coarse_steps() const { return sample_settings_.mechanisms.coarse_steps; }
 
-    /// A pass from which all pixels get something, where it is expected to take no more than half of the time left;
-    /// should it take much more, some of that is kept for a coarser one. Stride 1: one sample for each pixel.
+    /// Takes a pass that covers all pixels if it is expected to take at most half of the time left; a quarter of
+    /// that time is kept for a coarser pass in case it takes much longer. Stride 1: one sample per pixel.
     bool take_if_half_fits(int stride) {
         const Of cost = stride == 1 && !adaptive_ ? Of::samples : Of::centres;
         const auto pieces = passes_.pixels() / static_cast<std::uint64_t>(stride * stride);
@@ -257,8 +259,8 @@ private:
         }
     }
 
-    /// How many rays a sample takes is not known before: a sixteenth of the tiles shows it, and the others follow
-    /// if they are nearly sure to fit. Should they not, enough is kept for a coarse image.
+    /// The number of rays per sample is measured on a sixteenth of the tiles; the others follow if they are nearly
+    /// certain to fit. Enough rays are kept for a coarse image in case they do not.
     bool begin_with_a_sixteenth() {
         if (passes_.pixels() > rays_left()) return false;
         PassLimit part = limit();
@@ -276,7 +278,7 @@ private:
     void from_coarse_to_fine() {
         const bool timed = budget_.kind == Kind::time;
         if (!timed || !take_if_half_fits(2)) {
-            // Whatever the time, there is to be a whole frame: rather late than in part.
+            // A complete coarse frame is taken even if it is late.
             if (!take_centres(4, 0, FrameStep::coarse_4, timed ? PassLimit{} : limit())) return;
             if (!take_centres(2, 4, FrameStep::coarse_2)) return;
         }
@@ -306,7 +308,7 @@ private:
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
             if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.doubt(Of::samples);
             if (samples == 0) break;
-            if (to_show_ == ToShow::means) show();  // a pass that is given up spoils the means
+            if (to_show_ == ToShow::means) show();  // an abandoned pass invalidates the means
             const PassLimit l = limit();
             const PassCount pass = passes_.refine(sample_, stage_, next, l);
             costs_.note(Of::samples, pass.samples, pass.wall_ns);
@@ -320,7 +322,7 @@ private:
         if (sunlight_planned_ && SamplePlan::reaches(stage_, 2)) refine_sunlight();
     }
 
-    /// With what the uniform passes have left.
+    /// Spends what the uniform passes have left of the budget.
     void refine_sunlight() {
         const std::uint32_t each = SamplePlan::samples_of(stage_);
         const SamplePlan& plan = passes_.sunlight_plan();
@@ -338,13 +340,13 @@ private:
     [[nodiscard]] double sunlight_samples() const {
         if (budget_.kind == Kind::passes) return budget_.passes[kSunlightPass];
         if (budget_.kind == Kind::rays)
-            return std::min(static_cast<double>(rays_left()) / kMostRaysOfSunlight, kMostSamples);
+            return std::min(static_cast<double>(rays_left()) / kMaxRaysOfSunlight, kMaxSamples);
         return std::min(kSunlightTimePart * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())),
-                        kMostSamples);
+                        kMaxSamples);
     }
 
     struct RaysEach {
-        double sample = 2, path = 0;  ///< by Sun-only direct lighting: the camera's and the Sun's
+        double sample = 2, path = 0;  ///< default for Sun-only direct lighting: one camera ray and one Sun ray
     };
     [[nodiscard]] RaysEach rays_each(const PassCount& pass) const {
         const auto samples = static_cast<double>(std::max<std::uint64_t>(pass.samples, 1));
@@ -352,7 +354,7 @@ private:
         return {static_cast<double>(pass.rays - pass.path_rays) / samples,
                 static_cast<double>(pass.path_rays) / paths};
     }
-    /// Where the next pass shall lead; no further than the last: there is none.
+    /// Target stage of the next pass; equal to the present one if there is none.
     [[nodiscard]] Stage wanted(std::size_t pass) const {
         const SamplePlan& plan = passes_.plan();
         if (budget_.kind == Kind::passes)
@@ -361,12 +363,12 @@ private:
             const double left = static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays));
             if (left < kRest * static_cast<double>(budget_.rays)) return stage_;
             const double part = adaptive_ ? kNextRays : pass == 0 ? kFirstRays : kNextRaysOfPaths;
-            return plan.reach(stage_, std::min(part * left, kMostSamples), each_.sample, each_.path);
+            return plan.reach(stage_, std::min(part * left, kMaxSamples), each_.sample, each_.path);
         }
         if (!worth_a_pass()) return stage_;
         const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_for_samples()));
         return plan.reach(stage_,
-                          std::min(std::floor((pass == 0 ? kFirstPart : kNextPart) * fitting), kMostSamples));
+                          std::min(std::floor((pass == 0 ? kFirstPart : kNextPart) * fitting), kMaxSamples));
     }
     [[nodiscard]] bool worth_a_pass() const {
         return static_cast<double>(ns_for_samples()) >= kRest * static_cast<double>(time_given());
@@ -374,12 +376,12 @@ private:
     [[nodiscard]] std::int64_t ns_for_samples() const {
         return ns_left() - static_cast<std::int64_t>(for_sunlight(static_cast<double>(time_given())));
     }
-    /// The part of the budget that uniform passes leave.
+    /// The part of the budget reserved for sunlight samples.
     [[nodiscard]] double for_sunlight(double budget) const {
         return sunlight_planned_ ? kSunlightPart * budget : 0;
     }
 
-    /// A plan is made to its end, whatever the time: it is begun only where it leaves some for samples.
+    /// Planning cannot be interrupted, so it is begun only if time is left for samples.
     [[nodiscard]] bool worth_planning() const {
         if (budget_.kind != Kind::time) return true;
         const auto rest = static_cast<std::int64_t>(2 * kRest * static_cast<double>(time_given()));
@@ -409,8 +411,8 @@ private:
     std::vector<float>* const variance_;
 
     FrameAccount account_;
-    const Frame* frame_ = nullptr;  ///< whose tiles and G-buffer the passes hold
-    std::uint64_t rays_ = 0;        ///< that the budget is charged
+    const Frame* frame_ = nullptr;  ///< the frame whose tiles and G-buffer the passes hold
+    std::uint64_t rays_ = 0;        ///< charged to the budget
     RaysEach each_;                 ///< of the last pass of samples
     bool sunlight_planned_ = false, mostly_separate_ = false;
     ToShow to_show_ = ToShow::nothing;
@@ -424,19 +426,19 @@ void PassCosts::note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexce
     if (pieces == 0) return;
     double& ns = ns_[index(what)];
     const double now = static_cast<double>(wall_ns) / static_cast<double>(pieces);
-    if (pieces < kLeastPieces && !(known(what) && now < ns)) return;
-    // A frame that something delayed predicts little of the next.
+    if (pieces < kMinPieces && !(known(what) && now < ns)) return;
+    // Limits the weight of an outlier: a delayed frame predicts little of the next.
     switch (measurements_[index(what)]) {
         case 0: ns = now; break;
         case 1: ns = std::min(ns, now); break;
         default: ns += 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns);
     }
     if (measurements_[index(what)] < 2) ++measurements_[index(what)];
-    least_ns_[index(what)] = kLeastBelieved * ns;
+    min_ns_[index(what)] = kMinBelieved * ns;
 }
 
 void PassCosts::doubt(Of what) noexcept {
-    ns_[index(what)] = std::max(kDoubt * ns_[index(what)], least_ns_[index(what)]);
+    ns_[index(what)] = std::max(kDoubt * ns_[index(what)], min_ns_[index(what)]);
 }
 
 std::uint64_t PassCosts::fitting(Of what, std::int64_t wall_ns) const noexcept {

@@ -8,8 +8,8 @@
 namespace narpa {
 namespace {
 
-// Lanes from the batch's `n` on are computed along with the others and not read. Results are gathered in local
-// arrays, of which the compiler knows that they do not overlap with anything.
+// Lanes from the batch's `n` on are computed with the others and never read. Results are gathered in local arrays,
+// which the compiler knows not to alias anything.
 
 using Points = BatchSampler::Points;
 
@@ -32,7 +32,7 @@ void aim_at_centres(const Frame& f, const CameraSamples& s, RayBatch& rays) noex
     aim_through(f, p, rays);
 }
 
-/// Each sample's own point of its pixel. `u`: out, coordinates of which the last two are left.
+/// Each sample's point in its pixel. `u`: out, sample coordinates; the last two are unused here.
 NARPA_EACH_ISA void points_in_pixels(const Frame& f, const CameraSamples& s, ImagePoints& p, Points& u) noexcept {
     sampler_of(f, s).points(u);
     if (s.centre) u[0].fill(0.5), u[1].fill(0.5);
@@ -70,11 +70,12 @@ NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const
     to_sun = direction;
 }
 
-/// The random numbers with which a path would choose its point of the Sun from the first surface: unused where that
-/// point is chosen here.
+/// The dimensions with which a path would choose its point on the Sun from the first surface; free if that point is
+/// chosen here.
 constexpr std::uint32_t kPathsOwn = 2;
 
-/// Most paths choose their own points of the Sun.
+/// Aims the camera rays. Points on the Sun are chosen only if it is the only light or is sampled separately; paths
+/// choose their own.
 void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, CameraBatch& p) noexcept {
     const bool sun = f.sun && (f.sun_only || f.separate_sun);
     p.rays.n = s.n;
@@ -102,8 +103,8 @@ void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, CameraBatch& p)
     }
 }
 
-/// Moves rays from the camera's pose at mid-exposure to its pose at their own times. `u`: their places within the
-/// exposure of their row.
+/// Moves rays from the camera's pose at mid-exposure to its pose at their own times. `u`: time within the exposure
+/// of their row, in [0, 1).
 void move_to_times(const Frame& f, const CameraSamples& s, const Lanes<double>& u, RayBatch& rays) noexcept {
     for (std::size_t i = 0; i < s.n; ++i) {
         const double time = f.pose.time(s.y[i], f.camera.height, u[i]);

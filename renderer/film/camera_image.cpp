@@ -17,7 +17,7 @@
 namespace narpa {
 namespace {
 
-/// What the surface does to the colour of light at first sight.
+/// Albedo output of a surface.
 Rgb base_colour(const Surface& s) {
     switch (s.material->kind) {
         case Material::Kind::mirror: return s.specular;
@@ -36,7 +36,7 @@ void resize(Aovs& a, std::size_t n) {
     a.variance.resize(n);
 }
 
-/// Writes all but the variance, which is made 0.
+/// Writes all outputs but the variance, which is set to 0.
 void store_first_hit(const Frame& f, const Ray& ray, const Hit& hit, std::size_t pixel, Aovs& aovs) {
     const bool seen = hit.body >= 0;
     aovs.body[pixel] = hit.body;
@@ -128,7 +128,7 @@ struct CameraRenderer::Impl {
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
         optics.apply(before_optics, out);
         if (stars) stars->add(render_scene.tracer(), render_scene.medium(), at, pose, optics, out);
-        optics.add_veil(out);
+        optics.add_veiling_glare(out);
         if (ghost) ghost->add(render_scene.tracer(), render_scene.medium(), at, pose, out);
     }
 };

@@ -1,4 +1,4 @@
-/// renderer/film/camera_image.h - a camera's linear radiance image, and the exact outputs beside it.
+/// renderer/film/camera_image.h - a camera's linear radiance image and its AOVs.
 #pragma once
 
 #include <cstdint>
@@ -15,25 +15,23 @@ namespace narpa {
 
 /// The light that reaches the camera.
 ///
-/// Method direct: light that comes to a surface straight from the Sun and the scene's lights, with shadows;
-/// ambient, never shadowed; emission of what is seen; lamps of some size too, and these in mirrors and glass; black
-/// where nothing is hit, and where mirrors and glass would show other surfaces. Method path: all light (path.h),
-/// with the ambient as a sky.
+/// Method direct: direct lighting from the Sun and the scene's lights, with shadows; unshadowed ambient; emission
+/// of visible surfaces; visible area lights, also those seen in mirrors and glass. Black where nothing is hit, and
+/// where mirrors and glass would show other surfaces. Method path: all light (path.h), with the ambient as a sky.
 ///
-/// One sample a pixel goes through the centres of the pixel and of the lens and, where the method is direct and the
-/// Sun the only light, to the centre of the Sun: the image of a pinhole, without noise, with hard shadows. With
-/// more, each takes a point of the pixel, of the lens and of the Sun: edges are smooth, what is out of focus is
-/// blurred, shadows have their penumbra.
+/// One sample per pixel goes through the centres of the pixel and of the lens and, if the method is direct and the
+/// Sun the only light, to the centre of the Sun: a noise-free pinhole image with hard shadows. With more samples,
+/// each takes a random point of the pixel, of the lens and of the Sun: anti-aliasing, defocus and penumbrae.
 ///
-/// Bodies less than two pixels wide are sampled apart and keep their light whatever spp is: subpixel_bodies.h.
+/// Bodies less than two pixels wide are sampled separately and keep their light whatever spp is: subpixel_bodies.h.
 ///
-/// Last come, over the whole image, vignetting and point spread (image_optics.h), the stars (star_light.h), veiling
-/// glare and the Sun's ghost (sun_ghost.h). The account's error and the variance are those before them: a filter
-/// averages noise, so they are upper bounds then.
+/// Afterwards, vignetting and point spread (image_optics.h), the stars (star_light.h), veiling glare and the Sun's
+/// ghost (sun_ghost.h) are applied to the whole image. The account's error and the variance are those before them,
+/// and so upper bounds, because a filter averages noise.
 ///
-/// A pose that moves within the exposure, or bodies that do in a picture taken over time (CameraPose), are blurred:
-/// each sample takes a moment of its own, and one sample a pixel the middle of its row's exposure. Tile culling,
-/// sampling of subpixel bodies and, where bodies move, path reuse are then off.
+/// A camera that moves within the exposure, or bodies that move in an image taken over time (CameraPose), cause
+/// motion blur: each sample takes its own time, and one sample per pixel the middle of its row's exposure. Tile
+/// culling, sampling of subpixel bodies and, where bodies move, path reuse are then off.
 ///
 /// Runs on the calling thread's TBB arena. Same bytes on any number of threads. Allocates its memory with each
 /// call; for many frames use CameraRenderer. `aovs` may be null; they show a pinhole's view, subpixel bodies
@@ -42,20 +40,20 @@ void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const
                      const CameraPose& pose, const FrameSettings& settings, RadianceImage& out,
                      Aovs* aovs = nullptr);
 
-/// The same for a camera's frames one after another, within budgets: keeps memory and measured costs from frame to
-/// frame. With a budget in samples or rays, an image depends on neither. Allocates nothing after the first frame of
-/// a kind. Tiles that stay empty from frame to frame are not written again: nothing else may write to `out` in
+/// The same for a sequence of a camera's frames, within budgets: keeps memory and measured costs between frames.
+/// With a budget in samples or rays, the image depends on neither. Allocates nothing after the first frame of a
+/// kind. Tiles that stay empty from frame to frame are not written again: nothing else may write to `out` in
 /// between.
 class CameraRenderer {
 public:
-    /// Both outlive it. `with_stars`: those of the scene, if it has any.
+    /// Both arguments outlive it. `with_stars`: renders the scene's stars, if it has any.
     CameraRenderer(const RenderScene& render_scene, const Camera& camera, bool with_stars = true);
     ~CameraRenderer();
 
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                         RadianceImage& out, Aovs* aovs = nullptr);
-    /// With the variance of Aovs alone, which takes no rays of its own. Of `chosen` pixels alone, those that are
-    /// not 0: the budget is in samples, two or more, and the others hold anything then. Empty: all.
+    /// Outputs the variance of Aovs without the other AOVs, at no extra rays. `chosen`: renders only pixels where
+    /// it is not 0; the others are undefined, and the budget must be in samples, two or more. Empty: all pixels.
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                         RadianceImage& out, std::vector<float>& variance,
                         std::span<const std::uint8_t> chosen = {});

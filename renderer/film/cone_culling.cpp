@@ -7,13 +7,13 @@
 namespace narpa {
 namespace {
 
-constexpr double kConeGuard_px = 1e-3;  ///< more than what rounding does to image coordinates
+constexpr double kConeGuard_px = 1e-3;  ///< above the rounding error of image coordinates
 
 double angle_between_directions(const Vec3& a, const Vec3& b) {
     return std::atan2(norm(cross(a, b)), dot(a, b));
 }
 
-/// A part of a body as the camera sees it.
+/// Bounding cone of a part of a body, as the camera sees it.
 struct Ball {
     Vec3 direction{0, 0, 1};                   ///< to its centre, unit, camera axes
     double half_angle_rad = std::numbers::pi;  ///< pi: the camera is inside
@@ -23,8 +23,8 @@ struct ConeCulling {
     const CameraModel& model;
     std::span<const BoxNode> nodes;
     const BodyView& view;
-    double reach_m;   ///< slack, and the lens's radius, by which origins of rays differ
-    double turn_rad;  ///< by which the lens turns a ray at most
+    double reach_m;   ///< slack plus the lens's radius, because the origins of rays differ
+    double turn_rad;  ///< largest deflection of a ray by the lens
     TileMask& mask;
 
     void mark(std::uint32_t node, const TileRect& rect) const {
@@ -73,7 +73,7 @@ struct ConeCulling {
 
 void mark_by_cones(const CameraModel& model, const Lens* lens, const CulledBody& body, TileMask& mask) noexcept {
     const double lens_radius_m = lens != nullptr ? 0.5 * lens->aperture_diameter_m : 0;
-    // From a point of the aperture to one that is no nearer to its centre than the focus distance.
+    // Largest for a ray from the edge of the aperture to a point at the focus distance.
     const double turn_rad = lens != nullptr ? std::asin(std::min(1.0, lens_radius_m / lens->focus_distance_m)) : 0;
     const BoxNode all = box_about(body.bounds);
     ConeCulling{model,     body.boxes.empty() ? std::span(&all, 1) : body.boxes,

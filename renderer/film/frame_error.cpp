@@ -7,10 +7,10 @@
 namespace narpa {
 namespace {
 
-/// Limits of the ratio of variances from one doubling to the next: from that of edges to that of independent
-/// samples. Smooth pixels do better, but leave no error that counts; and where many edges have the same place in
-/// their pixels, steps fall by chance faster than the error does.
-constexpr double kLeastRatio = 0.353553, kMostRatio = 0.5;
+/// Limits of the ratio of variances from one doubling to the next: 2^-1.5 for edges, 1/2 for independent samples.
+/// Smooth pixels converge faster, but their error does not matter; and if many edges lie at the same place in their
+/// pixels, steps can by chance fall faster than the error.
+constexpr double kMinRatio = 0.353553, kMaxRatio = 0.5;
 /// After a single doubling: between edges and noise.
 constexpr double kRatioOfTwo = 0.42;
 
@@ -19,7 +19,7 @@ double left_after(double step, double ratio) {
 }
 
 double ratio_of(double last, double before) {
-    return before == 0 ? kRatioOfTwo : std::clamp(last / before, kLeastRatio, kMostRatio);
+    return before == 0 ? kRatioOfTwo : std::clamp(last / before, kMinRatio, kMaxRatio);
 }
 
 double squared(float step) {

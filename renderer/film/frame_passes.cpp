@@ -12,9 +12,9 @@
 namespace narpa {
 namespace {
 
-/// Tiles that a thread takes at a time. Sums are made chunk by chunk, so that they do not depend on the threads.
+/// Tiles per task. Sums are formed per chunk, so that they do not depend on the threads.
 constexpr std::size_t kChunk = 8;
-/// From so many tiles on, the error of a frame of centres is estimated from a tenth of them.
+/// With this many tiles or more, the error of a frame of centres is estimated from a tenth of them.
 constexpr std::size_t kManyTiles = 4096;
 
 /// The pixel that represents this one.
@@ -22,21 +22,21 @@ int representative(int x, int width, int stride) {
     return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
 }
 
-/// Which tiles may show light where rays meet no body: the Sun's disc, lights with extent, a background that is not
-/// uniform, a medium.
+/// Finds tiles that may show light although no body is in view: the Sun's disc, area lights, a non-uniform
+/// background, a medium.
 class EmittersInView {
 public:
     EmittersInView(const Frame& f, const Lens* lens) : f_(f) {
         everywhere_ = !f.sun_only && (f.render_scene.lights().any_with_extent() ||
                                       !f.render_scene.background().uniform() || f.render_scene.medium() != nullptr);
         if (f.sun_only || f.path.direct || !f.sun || f.sun->is_point()) return;
-        // Generous bounds of half the disc and of the way from point to point of a lens.
+        // Generous upper bounds of the Sun's angular radius and of the deflection of rays by the lens.
         const double disc_rad = f.tracer.scene().sun->angular_diameter_rad;
         const double lens_rad = lens != nullptr ? lens->aperture_diameter_m / lens->focus_distance_m : 0;
         within_rad_ = disc_rad + lens_rad;
         sun_ = true;
     }
-    /// Through a tile that begins here.
+    /// True if rays through the tile at pixel (x, y) may meet an emitter.
     [[nodiscard]] bool any(int x, int y) const {
         if (everywhere_ || !sun_) return everywhere_;
         const DirectionCone tile = f_.model->bounds({x - 0.5, y - 0.5, x + kTile - 0.5, y + kTile - 0.5});
@@ -50,7 +50,7 @@ private:
     double within_rad_ = 0;
 };
 
-// Lattices of tiles, the first of squares of 4 x 4.
+// Lattices of tiles; the first consists of blocks of 4 x 4 tiles.
 bool in_a_tenth(int tx, int ty) {
     return (tx / 4 + 3 * (ty / 4)) % 10 == 0;
 }
@@ -168,7 +168,7 @@ void FramePasses::fill_background(RadianceImage& out) {
             const Tile t = tile(i);
             Rgb* const first = &out.pixels[static_cast<std::size_t>(t.y) * static_cast<std::size_t>(out.width) +
                                            static_cast<std::size_t>(t.x)];
-            const bool stays = blank_[i] != 0 && *first == background_;  // else it is another image
+            const bool stays = blank_[i] != 0 && *first == background_;  // else `out` is another image
             blank_[i] = !g_buffer_.is_traced(i);
             if (blank_[i] == 0 || stays) continue;
             for (int y = 0; y < t.height; ++y)
@@ -245,13 +245,14 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
     put_pixels(t, r, g, b, out);
 }
 
-/// Of many tiles a tenth, in squares. On the craft at 1024 x 1024 the estimate is 3 % off that of all tiles.
+/// True if the tile is used for the error estimate: all tiles, or a tenth of many. On the craft at 1024 x 1024 this
+/// estimate differs by 3 % from that of all tiles.
 bool FramePasses::estimates(std::uint32_t tile) const noexcept {
     const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
     return tiles_.size() < kManyTiles || in_a_tenth(tx, ty);
 }
 
-/// These tiles and those beside them.
+/// The tiles of the error estimate and their neighbours.
 bool FramePasses::fills_g_buffer(std::uint32_t tile) const noexcept {
     if (tiles_.size() < kManyTiles) return true;
     const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
@@ -312,8 +313,8 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
         t.each_pixel([&](int, int, std::size_t at) {
             if (begin(at) == 0) means[at] = {};
         });
-        // The first samples of a uniform plan fill the G-buffer: until there are two, their error comes from
-        // contrasts.
+        // The first samples of a uniform plan fill the G-buffer: with fewer than two samples per pixel, the error
+        // comes from contrasts.
         const bool fill = plan_->is_uniform() && from == SamplePlan::none();
         w.samples(t, camera_.width, begin, end,
                   [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& light) {

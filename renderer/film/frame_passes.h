@@ -1,7 +1,7 @@
-/// renderer/film/frame_passes.h - the passes of which a frame is made.
+/// renderer/film/frame_passes.h - the rendering passes of a frame.
 ///
-/// A pass goes over the tiles in which something may be seen; the others show the background. It comes to its end
-/// or is discarded whole; its result goes to the image by `show_...`, afterwards.
+/// A pass covers the tiles that may show something; the others show the background. A pass completes or is
+/// discarded as a whole; `show_...` then writes its result to the image.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@
 
 namespace narpa {
 
-/// Where a pass is given up.
+/// Limits at which a pass is aborted.
 struct PassLimit {
     std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();  ///< CLOCK_MONOTONIC
     std::uint64_t rays = std::numeric_limits<std::uint64_t>::max();
@@ -28,57 +28,56 @@ struct PassLimit {
 struct PassCount {
     bool complete = true;
     std::uint64_t samples = 0, rays = 0;
-    std::uint64_t paths = 0, path_rays = 0;  ///< samples of these that paths follow; rays beyond first surfaces
-    std::uint64_t met = 0, separate = 0;  ///< samples that meet a surface; those whose direct sunlight is separate
+    std::uint64_t paths = 0, path_rays = 0;  ///< samples with a path; rays beyond first surfaces
+    std::uint64_t met = 0, separate = 0;     ///< samples that hit a surface; those with separate direct sunlight
     std::int64_t wall_ns = 0;
 };
 
 class FramePasses {
 public:
-    /// Both outlive it.
+    /// Both arguments outlive it.
     FramePasses(const Tracer& tracer, const Camera& camera);
 
-    /// Makes ready for a frame: finds the tiles in which something may be seen. `lens` may blur it; null: none
-    /// does.
+    /// Prepares a frame: finds the tiles that may show something. `lens`: its blur is allowed for; null: no blur.
     void begin(const Frame& f, const Lens* lens);
-    /// Pixels in which something may be seen.
+    /// Number of pixels in the tiles that may show something.
     [[nodiscard]] std::uint64_t pixels() const noexcept { return pixels_; }
 
-    /// Each pixel with `spp` samples, shown at once. Its variance goes to `variance`, if that is not null. Of
-    /// `chosen` pixels alone, those that are not 0: `spp` is at least 2, and the others hold anything then. Empty:
-    /// all.
+    /// Renders each pixel with `spp` samples and writes the image. Writes the variance to `variance` unless null.
+    /// `chosen`: renders only pixels where it is not 0; the others are undefined, and `spp` is at least 2. Empty:
+    /// all pixels.
     PassCount uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance,
                       std::span<const std::uint8_t> chosen = {});
 
-    /// Which tiles a pass goes over: a sixteenth lie spread evenly.
+    /// Tiles that a pass covers; the sixteenth is evenly spread.
     enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
-    /// Centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, but for those of an earlier
-    /// pass of stride `made` (0: there was none).
+    /// Traces the centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, except those of an
+    /// earlier pass of stride `made` (0: none).
     PassCount centres(const Frame& f, int stride, int made, const PassLimit& limit);
     void show_centres(const Frame& f, int stride, RadianceImage& out);
 
-    /// Adaptive, from the contrasts of the centres; else uniform.
+    /// Makes an adaptive plan from the contrasts of the centres, or a uniform plan.
     void make_plan(const Frame& f, bool adaptive);
     [[nodiscard]] const SamplePlan& plan() const noexcept { return *plan_; }
-    /// The samples that stage `to` has beyond stage `from`.
+    /// Traces the samples that stage `to` has beyond stage `from`.
     PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
                      Tiles which = Tiles::all);
 
-    /// Where direct sunlight is separate: plans further samples of it from the contrasts of the centres, which
-    /// belong to a frame by direct light.
+    /// If direct sunlight is separate: plans further samples of it from the contrasts of the centres, which must
+    /// come from a direct-light frame.
     void plan_sunlight(const Frame& f);
     [[nodiscard]] const SamplePlan& sunlight_plan() const noexcept { return *sunlight_plan_; }
-    /// Of each pixel, samples of direct sunlight alone beyond the first `each`, up to what that plan has at the
-    /// stage `to`.
+    /// Traces samples of direct sunlight alone: for each pixel those beyond the first `each`, up to stage `to` of
+    /// that plan.
     PassCount refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to, const PassLimit& limit);
 
-    /// Shows the pixels' means at a stage of the plan.
+    /// Writes the pixels' means at a stage of the plan to the image.
     void show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out, std::vector<float>* variance);
 
-    /// Of the image that `uniform` or `show_means` has shown last, or of the centres that were planned from.
+    /// Error of the image last written by `uniform` or `show_means`, or of the centres that the plan was made from.
     [[nodiscard]] double standard_error() const noexcept;
 
-    /// Returns where the time went since the last call, where the frames' settings ask for it.
+    /// Returns the time per phase since the last call, if FrameSettings::times is set.
     [[nodiscard]] PhaseTimes times() noexcept;
 
 private:
@@ -100,15 +99,16 @@ private:
     const Camera& camera_;
     TileCulling culling_;
     GBuffer g_buffer_;
-    std::vector<std::uint32_t> tiles_;  ///< in which something may be seen
+    std::vector<std::uint32_t> tiles_;  ///< that may show something
     std::uint64_t pixels_ = 0;
-    Rgb background_{};                ///< of the others
+    Rgb background_{};                ///< radiance of the other tiles
     std::vector<FrameError> errors_;  ///< of each chunk of tiles
 
-    std::optional<SamplePlan> plan_, sunlight_plan_;  ///< made when a frame first needs them, as are:
+    std::optional<SamplePlan> plan_, sunlight_plan_;  ///< allocated when first needed, as is means_
     std::vector<PerPixel<PixelMeans>> means_;
 
-    // Tiles that still have the background in the image that was last written, and which that was.
+    // Tiles that still hold the background in the image that was last written, and that image's pixels and
+    // background.
     std::vector<std::uint8_t> blank_;
     const Rgb* blank_image_ = nullptr;
     Rgb blank_background_{};

@@ -8,17 +8,17 @@
 namespace narpa {
 namespace {
 
-constexpr int kSide = kTile + 2;  // with a rim of neighbours
-constexpr int kRow = 16;          // values from row to row: more than there are, as many as a vector holds
+constexpr int kSide = kTile + 2;  // with a border of one neighbour
+constexpr int kRow = 16;          // row stride, padded to the width of a vector
 
 /// Two pixels show one surface if their normals are less than 6 degrees apart and the line between them less than
 /// 12 degrees off the tangent plane.
 constexpr float kSameNormal = 0.9945f;
 constexpr float kOffPlane2 = 0.0432f;  // squared sine
 
-constexpr float kMostContrast = 2e9f;  // W m^-2 sr^-1
+constexpr float kMaxContrast = 2e9f;  // W m^-2 sr^-1
 
-/// What a detail that one centre has met stands for, of all scales together.
+/// Weights of the squared contrast of a detail that one centre meets, integrated over all scales (g_buffer.h).
 constexpr float kDetailInCentres = 0.230f, kDetailInSamples = 0.200f;
 
 /// Row by row.
@@ -35,11 +35,10 @@ struct Pairs {
 struct alignas(64) GBuffer::Around {
     Grid<float> radiance{}, nx{}, ny{}, nz{}, depth{};
     Grid<std::uint32_t> surface{};
-    /// Of a pinhole: where a ray is one metre along the camera's axis, in the world's axes: ahead + x * right + y *
-    /// down.
+    /// Pinhole only: the point of a pixel's ray at depth 1 m is ahead + x * right + y * down, world axes.
     Vec3f ahead, right, down;
-    const Frame* frame = nullptr;          ///< of any other camera
-    int x_first, y_first, x_last, y_last;  ///< pixel of the corner of the rim; the image's last
+    const Frame* frame = nullptr;          ///< set for any other camera model
+    int x_first, y_first, x_last, y_last;  ///< pixel at the border's corner; last pixel of the image
 };
 
 GBuffer::GBuffer(int width, int height)
@@ -57,7 +56,7 @@ void GBuffer::begin_frame(const Rgb& background) {
 
 namespace {
 
-/// What is kept of a batch, lane by lane.
+/// Surface data of a batch, lane by lane.
 struct alignas(64) LaneSurfaces {
     Lanes<float> nx, ny, nz, depth_m;
     Lanes<std::uint32_t> surface;
@@ -129,14 +128,14 @@ void repeat(Around& a, std::size_t from, std::size_t at) {
     a.surface[at] = a.surface[from];
 }
 
-/// Row -1 is the rim above the tile, column -1 the rim on its left.
+/// Row -1 is the border above the tile, column -1 the border on its left.
 constexpr std::size_t cell(int row, int column) {
     return static_cast<std::size_t>((row + 1) * kRow + column + 1);
 }
 
 }  // namespace
 
-/// Beyond the image its last pixels are repeated: no edge there. The rim's corners are not used.
+/// Beyond the image its border pixels are repeated, which gives no edge. The corners of the border are not used.
 void GBuffer::gather(const Frame& f, std::size_t tile, Around& a) const noexcept {
     const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
     if (const Pinhole* pinhole = f.model->pinhole()) {
@@ -185,11 +184,12 @@ void GBuffer::gather(const Frame& f, std::size_t tile, Around& a) const noexcept
 
 namespace {
 
-/// Where the pixels' surfaces are, from the camera, in the world's axes.
+/// Positions of the pixels' surfaces relative to the camera, world axes.
 struct Positions {
     Grid<float> x, y, z;
 };
-/// By the camera's own model. Rays across the camera's axis have no depth: nothing there is steady.
+/// With the camera's own model. Rays perpendicular to the camera's axis have no depth, so their pixels never count
+/// as the same surface.
 template <class Around>
 [[gnu::noinline]] void locate_by_model(const Around& a, Positions& p) {
     static_assert(kRow == kLanes);
@@ -223,7 +223,7 @@ template <class Around>
         }
 }
 
-/// Compares each with the one `step` further on: of all rows but the last.
+/// Compares each pixel with the one `step` further on, in all rows but the last.
 template <class Around>
 [[gnu::always_inline]] inline void compare(const Around& a, const Positions& p, std::size_t step, Pairs& pairs) {
     for (std::size_t at = 0; at < (kSide - 1) * kRow; ++at) {
@@ -231,8 +231,8 @@ template <class Around>
         const float turn = a.nx[at] * a.nx[next] + a.ny[at] * a.ny[next] + a.nz[at] * a.nz[next];
         const float dx = p.x[next] - p.x[at], dy = p.y[next] - p.y[at], dz = p.z[next] - p.z[at];
         const float off = a.nx[at] * dx + a.ny[at] * dy + a.nz[at] * dz;
-        // Its fourth power is to be finite; the Sun's disc is 70 times fainter than the most.
-        const float d = std::min(std::max(a.radiance[next] - a.radiance[at], -kMostContrast), kMostContrast);
+        // Clamped so that its fourth power is finite; the Sun's disc is 70 times fainter than the limit.
+        const float d = std::min(std::max(a.radiance[next] - a.radiance[at], -kMaxContrast), kMaxContrast);
         const bool steady = (turn > kSameNormal) & (off * off <= kOffPlane2 * (dx * dx + dy * dy + dz * dz));
         const bool empty = a.surface[at] == 0, even = d == 0;
         const bool same = (a.surface[at] == a.surface[next]) & ((empty & even) | (!empty & steady));
@@ -241,12 +241,12 @@ template <class Around>
     }
 }
 
-/// Of the two pairs of a pixel along one axis.
+/// Sums over the two pairs of a pixel along one axis.
 struct AlongAxis {
     float edges, slopes;  ///< squared contrasts
-    float detail;         ///< of a peak or a hollow between two edges
-    float breaks;         ///< edges
-    float bend, known;    ///< squared second difference; 1: there is one
+    float detail;         ///< squared contrast of a peak or a dip between two edges
+    float breaks;         ///< number of edges
+    float bend, known;    ///< squared second difference; 1 if it is valid
 };
 
 [[gnu::always_inline]] inline AlongAxis along_axis(const Pairs& p, std::size_t at, std::size_t step) {
@@ -273,7 +273,7 @@ NARPA_EACH_ISA void measure_contrasts(const GBuffer::Around& a, TileContrast& ou
         const float known = h.known + v.known, bend = (h.bend + v.bend) / (6 * std::max(known, 1.0f));
         noise[at] = known > 0 ? bend : -1.0f;
         breaks[at] = h.breaks + v.breaks;
-        // The steps of a slanting edge are crossed along both axes: together, not twice.
+        // A slanting edge crosses both axes: the sum in quadrature avoids counting it twice.
         const float edges = std::sqrt(h.edges * h.edges + v.edges * v.edges);
         const float detail = std::max(h.detail, v.detail);
         edge[at] = edges * (1 / 12.0f) + detail * kDetailInSamples + (h.slopes + v.slopes) * (1 / 24.0f);
@@ -291,7 +291,7 @@ NARPA_EACH_ISA void measure_contrasts(const GBuffer::Around& a, TileContrast& ou
 
 }  // namespace
 
-/// It and its neighbours show the background alone.
+/// True if the tile and its four neighbours show only the background.
 bool GBuffer::in_empty_space(std::size_t tile) const noexcept {
     const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
     const auto empty = [&](std::size_t other) { return known_[other] != Known::something; };

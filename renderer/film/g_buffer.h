@@ -1,23 +1,23 @@
-/// renderer/film/g_buffer.h - what one sample of each pixel shows: radiance, normal, depth, surface. Its contrasts
-/// give the variance of a pixel's samples and the error of its centre, for adaptive sampling and for the frame's
-/// own error.
+/// renderer/film/g_buffer.h - one sample per pixel: radiance, normal, depth, surface. Its contrasts give the
+/// variance of a pixel's samples and the error of its centre, for adaptive sampling and for the frame's error
+/// estimate.
 ///
-/// Neighbours show the same surface if body, material and sunlight agree, their normals do, and the one lies in the
-/// other's tangent plane. Where they do not, an edge passes between them. An edge at a random place between two
-/// centres leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is represented by its
-/// centre, and of contrast^2 / 6 if by a random point.
+/// Neighbouring pixels show the same surface if body, material and sunlight agree, their normals are close, and
+/// each lies in the other's tangent plane. Otherwise an edge passes between them. An edge at a random place between
+/// two centres leaves the two pixels, together, a mean squared error of contrast^2 / 12 if each is represented by
+/// its centre, and of contrast^2 / 6 if by a random point.
 ///
-/// What differs from both its neighbours is a detail, a bar of width w in pixels, with two such edges; but where w
-/// is less than 1 the centres meet it only now and then. Averaged over its place, it leaves in each row of pixels
-/// that it crosses contrast^2 times
+/// A pixel that differs from both its neighbours is a detail: a bar of width w in pixels, with two such edges. If w
+/// is less than 1, only some centres meet it. Averaged over its position, it leaves in each row of pixels that it
+/// crosses contrast^2 times
 ///     w - w^2 - w^3 / 3          for centres, w <= 1/2,
 ///     1/2 - w + w^2 - w^3 / 3    for centres, 1/2 <= w <= 1,
 ///     w - w^2 + w^3 / 3          for random points, w <= 1,
-/// and from w = 1 on what its two edges leave, 1/6 and 1/3. One centre alone meets it in w of the rows up to w = 1,
-/// in 2 - w up to w = 2. With all scales equally frequent, that is w distributed as dw / w, each such meeting
-/// stands for 0.230 contrast^2 beyond the edges' for centres and 0.200 contrast^2 for random points.
+/// and for w >= 1 the error of its two edges, 1/6 and 1/3. A single centre meets it in w of the rows up to w = 1,
+/// in 2 - w up to w = 2. If all scales are equally frequent (density dw / w), each such hit adds to the edges'
+/// error 0.230 contrast^2 for centres and 0.200 contrast^2 for random points.
 ///
-/// What varies on one surface from pixel to pixel, beyond a steady slope, is noise or texture: second differences
+/// Variation on one surface from pixel to pixel, beyond a constant slope, is noise or texture: second differences
 /// of independent values of variance v have the mean square 6 v.
 #pragma once
 
@@ -32,10 +32,10 @@
 
 namespace narpa {
 
-inline constexpr int kTile = kTileSize;                    ///< pixels a side
+inline constexpr int kTile = kTileSize;                    ///< pixels per side
 inline constexpr std::size_t kTilePixels = kTile * kTile;  ///< four batches of 4 x 4, one after another
 
-/// Place of a pixel of a tile, in the order of the batches.
+/// Index of a pixel in its tile, in the order of the batches.
 constexpr std::size_t place_in_tile(int x, int y) noexcept {
     return static_cast<std::size_t>(((y >> 2) * 2 + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3));
 }
@@ -65,16 +65,16 @@ struct alignas(64) GBufferTile {
     PerPixel<float> r, g, b;     ///< radiance
     PerPixel<float> nx, ny, nz;  ///< normal, world
     PerPixel<float> depth_m;
-    PerPixel<float> reused;           ///< variance of light from reused paths, which neighbours have in common
-    PerPixel<std::uint32_t> surface;  ///< of body, material and sunlight; 0: background
+    PerPixel<float> reused;           ///< variance of light from reused paths, correlated between neighbours
+    PerPixel<std::uint32_t> surface;  ///< hash of body, material and sunlight; 0: background
 };
 
 /// Variances of mean bands, W^2 m^-4 sr^-2.
 struct alignas(64) TileContrast {
-    PerPixel<float> breaks;  ///< edges between it and its four neighbours
-    PerPixel<float> edge;    ///< of one random sample of the pixel, for edges, details and slopes
-    PerPixel<float> noise;   ///< of one sample, for all else; negative: not known
-    PerPixel<float> reused;  ///< of one sample, for light from reused paths: neighbours are off alike
+    PerPixel<float> breaks;  ///< number of edges between the pixel and its four neighbours
+    PerPixel<float> edge;    ///< of one random sample, from edges, details and slopes
+    PerPixel<float> noise;   ///< of one random sample, from all else; negative: unknown
+    PerPixel<float> reused;  ///< of one random sample, from reused paths (correlated between neighbours)
     PerPixel<float> centre;  ///< expected squared error of the centre
 
     /// Variance of one random sample of a pixel.
@@ -95,19 +95,19 @@ public:
     [[nodiscard]] GBufferTile& tile(std::size_t i) noexcept { return tiles_[i]; }
     [[nodiscard]] const GBufferTile& tile(std::size_t i) const noexcept { return tiles_[i]; }
 
-    /// Which tiles are traced in this frame; the others show this background.
+    /// Starts a frame in which no tile is traced yet; untraced tiles show this background.
     void begin_frame(const Rgb& background);
     void set_traced(std::size_t tile) noexcept { known_[tile] = Known::background; }
     [[nodiscard]] bool is_traced(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
 
-    /// Stores one sample of each of a batch's pixels. `place`: of each lane in the tile.
+    /// Stores one sample of each of a batch's pixels. `place`: index of each lane's pixel in the tile.
     void store(const Frame& f, const CameraBatch& p, const BatchRadiance& light, const Lanes<std::uint8_t>& place,
                std::size_t tile) noexcept;
 
-    /// From a tile and its neighbours.
+    /// Computes contrasts from a tile and its neighbours.
     void contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
 
-    /// A tile with a rim of its neighbours.
+    /// A tile with a border of its neighbours' pixels.
     struct Around;
 
 private:
@@ -119,7 +119,7 @@ private:
     int width_, height_, tiles_x_, tiles_y_;
     Rgb background_{};
     std::vector<GBufferTile> tiles_;
-    /// Of a tile: not traced; no more than the background so far; something.
+    /// State of a tile: not traced; only background so far; something else.
     enum class Known : std::uint8_t { nothing, background, something };
     std::vector<Known> known_;
 };

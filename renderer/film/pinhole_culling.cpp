@@ -9,16 +9,16 @@
 namespace narpa {
 namespace {
 
-constexpr double kGuard_px = 1e-3;  ///< more than what rounding does to image coordinates
+constexpr double kGuard_px = 1e-3;  ///< above the rounding error of image coordinates
 
-/// The image of a pinhole in units of tiles: tile (i, j) is what lies from i to i + 1 and from j to j + 1.
+/// The image plane of a pinhole in units of tiles: tile (i, j) spans i to i + 1 and j to j + 1.
 struct TileGrid {
     TileRect all;
     double width, height;
     Pinhole image;
     double guard = kGuard_px / kTileSize;
-    double lens_radius_m, inverse_focus_per_m;  ///< of a pinhole 0, 0
-    double longest;  ///< of the rays, per metre along the camera's z axis, the longest, from anywhere on the lens
+    double lens_radius_m, inverse_focus_per_m;  ///< both 0 without a lens
+    double longest;  ///< length of the longest ray, from anywhere on the lens, per metre along the camera's z axis
 
     TileGrid(const Pinhole& pinhole, const Camera& c, const Lens* lens, const TileRect& whole)
         : all(whole),
@@ -33,7 +33,7 @@ struct TileGrid {
     }
 };
 
-/// A part of the image, in tiles. Starts with nothing.
+/// A rectangle of the image, in tiles; initially empty.
 struct Extent {
     double x_low = 1e300, x_high = -1e300, y_low = 1e300, y_high = -1e300;
 
@@ -63,7 +63,7 @@ constexpr std::array<PerCorner, 3> kSides{
     {{-1, 1, -1, 1, -1, 1, -1, 1}, {-1, -1, 1, 1, -1, -1, 1, 1}, {-1, -1, -1, -1, 1, 1, 1, 1}}};
 struct Edge {
     Corner a, b;
-    unsigned faces;  ///< the two that meet here: bit 2 k the lower, 2 k + 1 the upper one along axis k
+    unsigned faces;  ///< bits of the two adjacent faces: 2 k the lower, 2 k + 1 the upper one along axis k
 };
 constexpr std::array<Edge, 12> kEdges = [] {
     std::array<Edge, 12> edges{};
@@ -79,10 +79,10 @@ constexpr std::array<Edge, 12> kEdges = [] {
     return edges;
 }();
 
-/// A box as the camera sees it.
-class SeenBox {
+/// A box in the camera's frame.
+class CameraBox {
 public:
-    SeenBox(const BoxNode& node, const TileGrid& grid, const BodyView& view, double slack_m)
+    CameraBox(const BoxNode& node, const TileGrid& grid, const BodyView& view, double slack_m)
         : grid_(grid), view_(view), centre_(view.centre_camera) {
         for (std::size_t k = 0; k < 3; ++k) {
             const double low = node.low[k], high = node.high[k];
@@ -96,8 +96,8 @@ public:
     [[nodiscard]] bool behind() const { return centre_.z + half_z_ <= 0; }
     [[nodiscard]] bool in_front() const { return centre_.z - half_z_ > 0; }
 
-    /// Where a box in front lies in the image: (x + dx) / (z + dz) = x / z + (dx - (x / z) dz) / (z + dz), and the
-    /// bracket is linear over the box. Rays from elsewhere on the lens shift it by the blur.
+    /// Image extent of a box in front of the camera: (x + dx) / (z + dz) = x / z + (dx - (x / z) dz) / (z + dz),
+    /// and the bracket is linear over the box. Rays from other points of the lens shift it by the blur.
     [[nodiscard]] Extent project() const {
         const double x = centre_.x / centre_.z, y = centre_.y / centre_.z, inverse_z = 1 / (centre_.z - half_z_);
         double reach_x = 0, reach_y = 0;
@@ -113,14 +113,14 @@ public:
         return e;
     }
 
-    /// The same of one that is partly behind; false where it may be anywhere.
+    /// The same for a box that is partly behind the camera; false if it may be anywhere.
     bool project_clipped(Extent& e) const {
         double away2 = 0;
         for (std::size_t k = 0; k < 3; ++k) {
             const double beyond = std::max(0.0, std::abs(from_camera_m_[k]) - half_m_[k]);
             away2 += beyond * beyond;
         }
-        // What a ray of the image meets is at least so far along the z axis.
+        // Lower bound of the z coordinate at which a ray of the image meets the box.
         const double near_z = (1 - 1e-9) * (std::sqrt(away2) - grid_.lens_radius_m) / grid_.longest;
         if (!(near_z > 0)) return false;
         const Corners p = corners();
@@ -139,8 +139,8 @@ public:
         return true;
     }
 
-    /// Calls f(row, x_low, x_high) with the part of each row of tiles that the outline of a box in front spans.
-    /// From each point of the lens the box is a convex shape in the image.
+    /// Calls f(row, x_low, x_high) with the part of each row of tiles that the outline of a box in front covers.
+    /// From each point of the lens the box's image is convex.
     template <class F>
     void for_each_row(const TileRect& rect, const F& f) const {
         const double blur = widest_blur();
@@ -178,12 +178,12 @@ public:
     }
 
 private:
-    /// Which faces may show, and which may be hidden, to some of the lens: bit 2 k the lower, 2 k + 1 the upper one
-    /// along axis k.
+    /// Faces that may be visible, and faces that may be hidden, from some point of the lens: bit 2 k the lower, 2 k
+    /// + 1 the upper one along axis k.
     struct Faces {
         unsigned may_show = 0, may_hide = 0;
 
-        /// Not between two faces that both show, or both do not, to all of the lens.
+        /// False for an edge between two faces that are both visible, or both hidden, from the whole lens.
         [[nodiscard]] bool may_be_outline(const Edge& edge) const {
             return (may_show & edge.faces) != 0 && (may_hide & edge.faces) != 0;
         }
@@ -199,7 +199,7 @@ private:
         return f;
     }
 
-    /// The largest of the radii of blur, over the image distance.
+    /// The largest blur radius over the box, on the plane z = 1.
     [[nodiscard]] double widest_blur() const {
         if (grid_.lens_radius_m == 0) return 0;
         return grid_.lens_radius_m * std::max(std::abs(1 / (centre_.z - half_z_) - grid_.inverse_focus_per_m),
@@ -223,19 +223,19 @@ private:
     const TileGrid& grid_;
     const BodyView& view_;
     Vec3 centre_;                                   ///< camera's frame
-    double half_z_ = 0;                             ///< of its extent along the camera's z axis
+    double half_z_ = 0;                             ///< half of its extent along the camera's z axis
     std::array<double, 3> from_camera_m_, half_m_;  ///< body frame
 };
 
-/// Marks the boxes of a tree, no further down than it takes to tell tiles apart.
+/// Marks the boxes of a tree, descending only as far as is needed to tell tiles apart.
 NARPA_EACH_ISA void mark_boxes(std::span<const BoxNode> nodes, const TileGrid& grid, const BodyView& view,
                                double slack_m, TileMask& mask) {
-    std::array<std::uint32_t, kBoxLeaves + 1> open;  // one more with each step down
+    std::array<std::uint32_t, kBoxLeaves + 1> open;  // a stack; grows by one per level
     std::size_t n = 0;
     open[n++] = 0;
     while (n > 0) {
         const BoxNode& node = nodes[open[--n]];
-        const SeenBox box(node, grid, view, slack_m);
+        const CameraBox box(node, grid, view, slack_m);
         if (box.behind()) continue;
         const bool leaf = node.children == 0;
         const auto descend = [&] { open[n++] = node.children, open[n++] = node.children + 1; };
@@ -268,15 +268,16 @@ NARPA_EACH_ISA void mark_boxes(std::span<const BoxNode> nodes, const TileGrid& g
     }
 }
 
-/// An ellipsoid, exactly, in front of the camera, around it or partly behind it: in the frame that squeezes it into
-/// a sphere, the rays that meet it make a circular cone, and so do, about them, those of a rectangle of the image.
-class SeenEllipsoid {
+/// Exact test of an ellipsoid in front of the camera, around it or partly behind it: in the frame scaled so that
+/// the ellipsoid is a sphere, the rays that meet it form a circular cone, and those of an image rectangle are
+/// bounded by another.
+class CameraEllipsoid {
 public:
-    SeenEllipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view, double slack_m) {
+    CameraEllipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view, double slack_m) {
         const Vec3& semi_axes_m = bounds.semi_axes_m;
-        // Rays from elsewhere on the lens meet what those from its centre meet when a ball of the lens's radius is
-        // added to it: an ellipsoid that holds the sum (A. Kurzhanski, I. Valyi, "Ellipsoidal Calculus for
-        // Estimation and Control", 1997, the one of least trace; of a sphere it is the sum itself).
+        // The lens is allowed for by adding a ball of the lens's radius: an ellipsoid that contains the sum (A.
+        // Kurzhanski, I. Valyi, "Ellipsoidal Calculus for Estimation and Control", 1997, the one of least trace;
+        // for a sphere it is the sum itself).
         const double ball = grid.lens_radius_m + slack_m, p = norm(semi_axes_m) / (std::sqrt(3.0) * ball);
         Vec3 axes;
         for (int k = 0; k < 3; ++k)
@@ -294,7 +295,7 @@ public:
             return squeeze * (d.x * view.axes_body[0] + d.y * view.axes_body[1] + d.z * view.axes_body[2]);
         };
         origin_ = squeezed(origin), per_x_ = squeezed(per_x), per_y_ = squeezed(per_y);
-        // The lens turns a ray by as much as this many tiles in the plane of a pinhole.
+        // Largest deflection of a ray by the lens, in tiles.
         reach_x_ = grid.image.fx * grid.lens_radius_m * grid.inverse_focus_per_m + grid.guard;
         reach_y_ = grid.image.fy * grid.lens_radius_m * grid.inverse_focus_per_m + grid.guard;
     }
@@ -316,7 +317,7 @@ private:
                      half_y = 0.5 * (rect.y_last + 1 - rect.y_first) + reach_y_;
         const double x = 0.5 * (rect.x_first + rect.x_last + 1), y = 0.5 * (rect.y_first + rect.y_last + 1);
         const Vec3 middle = normalized(origin_ + x * per_x_ + y * per_y_);
-        // Of the cone about the rectangle: its widest corner.
+        // Sine of the half angle of the rectangle's bounding cone, from its widest corner.
         double sine = 0;
         for (const double i : {-1.0, 1.0})
             for (const double j : {-1.0, 1.0}) {
@@ -335,17 +336,17 @@ private:
 
     bool around_ = false;          ///< the camera is inside
     Vec3 to_centre_;               ///< unit
-    double sin_ = 0, cos_ = 0;     ///< of half the angle of the body's cone
-    Vec3 origin_, per_x_, per_y_;  ///< of the direction of a ray: Pinhole::rays in the squeezed frame
+    double sin_ = 0, cos_ = 0;     ///< of the half angle of the body's cone
+    Vec3 origin_, per_x_, per_y_;  ///< ray direction as from Pinhole::rays, in the scaled frame
     double reach_x_ = 0, reach_y_ = 0;
 };
 
-/// Within the box about it, which is the tighter of the two for one that is very flat or long.
+/// Restricted to the ellipsoid's bounding box, which is the tighter bound for very flat or long ellipsoids.
 void mark_ellipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyView& view, double slack_m,
                     TileMask& mask) {
     const BoxNode node = box_about(bounds);
     const double rounding_m = 0x1p-23 * (norm(bounds.centre_m) + norm(bounds.semi_axes_m));
-    const SeenBox box(node, grid, view, rounding_m + slack_m);
+    const CameraBox box(node, grid, view, rounding_m + slack_m);
     if (box.behind()) return;
     TileRect rect = grid.all;
     if (box.in_front()) {
@@ -353,7 +354,7 @@ void mark_ellipsoid(const BodyBounds& bounds, const TileGrid& grid, const BodyVi
         if (!e.within(grid)) return;
         rect = tiles_of(e, grid);
     }
-    SeenEllipsoid(bounds, grid, view, slack_m).mark(rect, mask);
+    CameraEllipsoid(bounds, grid, view, slack_m).mark(rect, mask);
 }
 
 }  // namespace

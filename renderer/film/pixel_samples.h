@@ -9,7 +9,8 @@
 
 namespace narpa {
 
-/// Samples of one pixel, summed in double: 2^24 equal ones are exact to 1e-9, where float stops growing.
+/// Samples of one pixel, summed in double: 2^24 equal samples are exact to 1e-9, whereas a float sum stops growing
+/// there.
 class PixelSamples {
 public:
     void add(const Rgb& radiance) {
@@ -22,7 +23,7 @@ public:
     }
     [[nodiscard]] int count() const { return n_; }
     [[nodiscard]] Vec3 mean() const { return sum_ / static_cast<double>(n_); }
-    /// Squared distances of the samples' mean bands from their mean, summed (Welford 1962).
+    /// Sum of squared deviations of the samples' mean bands from their mean (Welford 1962).
     [[nodiscard]] double squared_deviations() const { return deviations_; }
 
 private:
@@ -31,8 +32,9 @@ private:
     int n_ = 0;
 };
 
-/// The mean, and by how much its mean band moved when the number of samples last reached a power of two: a
-/// low-discrepancy sequence is at its best there, and the steps give how fast it converges (frame_error.h).
+/// The mean, and the change of its mean band when the number of samples last reached a power of two:
+/// low-discrepancy sequences are at their best there, and the steps show how fast the mean converges
+/// (frame_error.h).
 class PixelMean {
 public:
     void add(const Rgb& radiance) {
@@ -48,7 +50,7 @@ public:
     [[nodiscard]] Vec3 mean() const { return sum_ / static_cast<double>(n_); }
     /// From half as many samples to the last power of two; there must have been two samples.
     [[nodiscard]] float step() const { return step_; }
-    /// The one before; there must have been four.
+    /// The step before that; there must have been four samples.
     [[nodiscard]] float step_before() const { return step_before_; }
 
 private:
@@ -57,7 +59,7 @@ private:
     float at_power_ = 0, step_ = 0, step_before_ = 0;
 };
 
-/// Of light in two parts, each with samples of its own number.
+/// Means of light in two parts, each with its own number of samples.
 struct PixelMeans {
     PixelMean direct, path;
 
@@ -68,18 +70,18 @@ struct PixelMeans {
     }
 };
 
-/// Samples that the neighbours' common variance counts for in a pixel's own.
+/// Weight of the neighbours' pooled variance in a pixel's own, in samples.
 inline constexpr double kPriorCount = 64;
 
-/// Variance of each pixel's mean as if its samples were independent, for pixels side by side with equally many
+/// Variance of each pixel's mean as if its samples were independent, for adjacent pixels with equal numbers of
 /// samples, at least two.
 ///
 /// A pixel's own sample variance is unreliable below about 64 samples: most pixels with a small bright spot have
 /// not met it yet and report zero; where the radiance is spread over decades, the 95 % interval holds the truth in
-/// 65 % (4 samples) to 83 % (64) of pixels. So the neighbours' pooled variance enters as kPriorCount samples more,
-/// and as the neighbours may be smoother than the pixel itself, its own variance is a lower bound. The result is
-/// rather too large than too small: by 0.4 in 4 samples, 0.1 in 64 where all pixels are alike. What low-discrepancy
-/// samples gain is VarianceRatio's part (frame_error.h).
+/// 65 % (4 samples) to 83 % (64) of pixels. So the neighbours' pooled variance is added with a weight of
+/// kPriorCount samples, and, as the neighbours may be smoother than the pixel itself, its own variance is a lower
+/// bound. The result is biased high: by 0.4 for 4 samples, 0.1 for 64 where all pixels are alike. VarianceRatio
+/// (frame_error.h) accounts for the gain of low-discrepancy samples.
 inline void variances_of_means(std::span<const PixelSamples> pixels, std::span<double> variances) {
     double pooled = 0;
     for (const PixelSamples& p : pixels) pooled += p.squared_deviations() / (p.count() - 1);

@@ -11,26 +11,25 @@
 namespace narpa {
 namespace {
 
-/// Edges move by less than a pixel, and centres meet thin parts only now and then: pixels beside an edge get this
-/// part of its variance, those next to them that.
+/// Edges move by less than a pixel, and centres often miss thin parts: pixels next to an edge get the fraction
+/// kBeside of its variance, the next ones kNextButOne.
 constexpr float kBeside = 0.05f, kNextButOne = 0.01f;
-/// The least weight of a pixel that differs from its neighbours, of a typical edge's. Where all is the very same,
-/// as in empty space, a pixel has an eighth of that (kEventful).
-constexpr double kLeast = 1.0 / 128;
-/// A pixel whose centre met nothing gets so many doublings of kLeast: thin parts of a body may pass between the
-/// centres, as its bounds are there, and to search for them costs one ray and no shading.
+/// Smallest weight of a pixel that differs from its neighbours, relative to a typical edge's. Pixels in completely
+/// uniform regions, such as empty space, get an eighth of it (kMinNonUniformWeight).
+constexpr double kMin = 1.0 / 128;
+/// A pixel whose centre hit nothing gets kMin times two to this power: a body's bounds are in view, so thin parts
+/// may pass between the centres, and a search costs one ray and no shading.
 constexpr int kEmptyDoublings = 2;
-/// Along an edge of little contrast there may be a glint that no centre met: so much of a typical variance is
-/// assumed.
+/// An edge of little contrast may hide a glint that no centre met: this fraction of a typical variance is assumed.
 constexpr float kUnseen = 0.02f;
-/// The variance of edges, which falls as n^-1.5, counts to this power beside that of noise, which falls as 1/n: of
-/// the variances of one sample, weights of 2/5 and of 1/2.
+/// Exponent of the variance of edges, which falls as n^-1.5, beside that of noise, which falls as 1/n: the weights
+/// are the powers 2/5 and 1/2 of the variances of one sample.
 constexpr double kEdgePower = 0.8;
 
 constexpr int kRim = 2;
 constexpr int kPlanSide = kTile + 2 * kRim;
 using PlanGrid = std::array<std::array<float, kPlanSide>, kPlanSide>;
-constexpr std::size_t kGrain = 16;  ///< tiles of a task
+constexpr std::size_t kGrain = 16;  ///< tiles per task
 
 /// Folds 2 r + 1 neighbours.
 template <class Value, class Fold>
@@ -42,10 +41,10 @@ float fold(int r, Value&& value, Fold&& with) {
 constexpr auto kGreatest = [](float a, float b) { return std::max(a, b); };
 constexpr auto kSum = [](float a, float b) { return a + b; };
 
-/// What a tile's pixels and their neighbours to two pixels' distance hold.
+/// Contrasts of a tile's pixels and their neighbours up to two pixels away.
 struct Neighbourhood {
     PlanGrid edge{};            ///< variance
-    PlanGrid noise{}, known{};  ///< variance, where it is known: 1
+    PlanGrid noise{}, known{};  ///< variance; 1 where it is known
 };
 
 Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& contrasts, int tx, int ty,
@@ -66,9 +65,9 @@ Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& c
     return n;
 }
 
-/// Variance of one sample of each pixel, relative to a typical one; 0: all is the same around it.
+/// Variance of one sample of each pixel, relative to a typical one; 0 if its surroundings are uniform.
 PerPixel<double> variances_of(const Neighbourhood& n, double typical, bool edge_classes) {
-    PlanGrid near{}, far{}, noises{}, knowns{};  // along the rows, then along the columns
+    PlanGrid near{}, far{}, noises{}, knowns{};  // folded along the rows, then along the columns
     for (int y = 0; y < kPlanSide; ++y)
         for (int x = kRim; x < kPlanSide - kRim; ++x) {
             const auto row = [&](const PlanGrid& g) { return [&g, x, y](int k) { return g[y][x + k]; }; };
@@ -81,7 +80,8 @@ PerPixel<double> variances_of(const Neighbourhood& n, double typical, bool edge_
     for (int y = kRim; y < kPlanSide - kRim; ++y)
         for (int x = kRim; x < kPlanSide - kRim; ++x) {
             const auto column = [&](const PlanGrid& g) { return [&g, x, y](int k) { return g[y + k][x]; }; };
-            // What has the pixel's own centre in it are its own noise and that of the four beside it.
+            // Excluded below: the noise values that contain the pixel's own centre, those of the pixel and its four
+            // neighbours.
             const auto cross = [&](const PlanGrid& g) {
                 return g[y][x] + g[y][x - 1] + g[y][x + 1] + g[y - 1][x] + g[y + 1][x];
             };
@@ -103,7 +103,7 @@ void over_tiles(std::span<const std::uint32_t> tiles, Do&& act) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tiles.size(), kGrain), act, tbb::simple_partitioner());
 }
 
-/// Rank of a tile among 8 x 8: Bayer's ordered dither, whose first 4^k ranks lie evenly.
+/// Rank of a tile among 8 x 8: Bayer's ordered dither, whose first 4^k ranks are evenly spread.
 int rank_of(int tx, int ty) {
     int rank = 0;
     for (int bit = 0; bit < 3; ++bit) {
@@ -167,10 +167,12 @@ void SamplePlan::weigh_tile(const Frame& f, const GBuffer& g_buffer, std::size_t
             out = -1;
             if (tx * kTile + x >= g_buffer.width() || ty * kTile + y >= g_buffer.height()) continue;
             const double variance = variances[place];
-            const double doublings = std::log2(std::max(std::sqrt(variance), kLeast) / kLeast);
-            const int of_variance = variance > 0 ? kEventful + static_cast<int>(kPerDoubling * doublings) : 0;
+            const double doublings = std::log2(std::max(std::sqrt(variance), kMin) / kMin);
+            const int of_variance =
+                variance > 0 ? kMinNonUniformWeight + static_cast<int>(kPerDoubling * doublings) : 0;
             const bool empty = g_buffer.tile(tile).surface[place] == 0;
-            const int weight = std::max(of_variance, empty ? kEventful + kEmptyDoublings * kPerDoubling : 0);
+            const int weight =
+                std::max(of_variance, empty ? kMinNonUniformWeight + kEmptyDoublings * kPerDoubling : 0);
             const auto hash = static_cast<int>(sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling);
             out = static_cast<Weight>(std::min(weight + hash, kWeights - 1));
             ++histogram[static_cast<std::size_t>(out)];
@@ -235,7 +237,7 @@ SamplePlan::Stage SamplePlan::reach(Stage from, double rays, double each_sample,
     };
     const double most = rays_of(from) + rays;
     int within = std::max(from.level, uniform_ ? 0 : -kWeights);
-    int beyond = uniform_ ? samples_each(kMostEach).level + 1 : kFull + 1;
+    int beyond = uniform_ ? samples_each(kMaxEach).level + 1 : kFull + 1;
     while (within + 1 < beyond) {
         const int middle = within + (beyond - within) / 2;
         (rays_of({middle}) <= most ? within : beyond) = middle;

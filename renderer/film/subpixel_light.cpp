@@ -12,7 +12,7 @@
 namespace narpa {
 namespace {
 
-/// First random sequence of subpixel bodies: none of a pixel's own.
+/// First random sequence of subpixel bodies; distinct from those of the pixels.
 constexpr std::uint32_t kFirstNumber = 0x80000000u;
 
 /// A point of the unit disc and the area that it represents.
@@ -20,8 +20,8 @@ struct DiscPoint {
     double x, y, area;
 };
 
-/// One of n evenly spread points of the disc: a lattice by the golden section, whose error over outlines of bodies
-/// is half of that of a Sobol set as large (measured, 1024 points: 0.7 % of a rectangle's area).
+/// One of n evenly spread points of the disc: a golden-ratio lattice, whose error over the outlines of bodies is
+/// half that of a Sobol set of the same size (measured, 1024 points: 0.7 % of a rectangle's area).
 DiscPoint lattice_point(std::uint32_t i, std::uint32_t n) {
     const double turns = i / std::numbers::phi;
     const auto [x, y] = concentric_disc((i + 0.5) / n, turns - std::floor(turns));
@@ -31,16 +31,16 @@ DiscPoint lattice_point(std::uint32_t i, std::uint32_t n) {
 /// The part of the disc that the Sun can light gets half of the samples, however thin its crescent; the rest gets
 /// the other half. Each part is the disc, compressed along x.
 DiscPoint disc_point(double lit, std::uint32_t s, std::uint32_t samples) {
-    constexpr double kMostlyLit = 0.75;
+    constexpr double kMaxlyLit = 0.75;
     const std::uint32_t half = samples / 2;
-    if (lit > kMostlyLit) return lattice_point(s, samples);
+    if (lit > kMaxlyLit) return lattice_point(s, samples);
     const auto [a, y, area] = lattice_point(s % half, half);
     const double half_chord = std::sqrt(std::max(0.0, 1 - y * y));
     if (s < half) return {lit * a + (1 - lit) * half_chord, y, lit * area};
     return {(1 - lit) * a - lit * half_chord, y, (1 - lit) * area};
 }
 
-/// As many as its pixels would take, within limits; even.
+/// As many samples as its pixels would take, within limits; even.
 std::uint32_t samples_of(const SubpixelDisc& disc, int spp) {
     const double as_pixels = spp * std::numbers::pi * disc.radius_px * disc.radius_px;
     const double samples = std::clamp<double>(as_pixels, kSubpixelSamplesLeast, kSubpixelSamplesMost);
@@ -58,10 +58,9 @@ double cubic_integral(double t) {
 }
 
 /// The share of a sample's light that a pixel gets along one axis, by its distance from the sample, px. Without a
-/// point spread function it is the sample's pixel that gets all. Its filter, which comes later,
-/// takes the image for a smooth function: a body then has to be where it is between the pixels, neither in the
-/// middle of one nor wider than it is. The share is that of the pixel's area in cubic interpolation; below zero at
-/// the edges.
+/// point spread function the sample's pixel gets all of it. With one, the filter that is applied later treats the
+/// image as a smooth function, so the body must keep its subpixel position and its width. The share is then the
+/// integral of cubic interpolation over the pixel's area; negative at the edges.
 double pixel_share(bool spread, double distance_px) {
     if (!spread) return distance_px > -0.5 && distance_px <= 0.5 ? 1 : 0;
     return cubic_integral(distance_px + 0.5) - cubic_integral(distance_px - 0.5);
@@ -78,16 +77,16 @@ public:
 
 private:
     void add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t samples);
-    /// Ray i is seen at this image point: true if it has a part in the block.
+    /// Shares out ray i, seen at this image point; true if any of its light falls in the block.
     bool share_out(const ImagePoint& p, std::size_t i);
     void trace(std::size_t body);
 
-    Frame f_;  ///< with the width of a body's samples
+    Frame f_;  ///< with the footprint of a body's samples
     const PixelBlock& block_;
     double pixel_angle_rad_;
     CameraBatch batch_;
     Lanes<Lanes<double>> columns_{}, rows_{};  ///< of each ray: shares of the block's columns and rows
-    Lanes<double> area_px2_{};                 ///< of the image, that each ray stands for
+    Lanes<double> area_px2_{};                 ///< area of the image that each ray represents
     Lanes<Vec3> light_{};                      ///< of each pixel
     Lanes<double> covered_{}, variance_{};
     Lanes<double> body_sum_{}, body_squares_{};  ///< of one body's samples
@@ -110,13 +109,13 @@ void Collector::sample(const SubpixelDisc& disc) {
 
 void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t samples) {
     const PixelSampler numbers(0, 0, 0);  // the same for every body and frame, as the points are
-    Vec3 from{};                          // on the aperture, camera axes
+    Vec3 from{};                          // point on the aperture, camera axes
     if (f_.lens != nullptr) {
         const SamplePoint u = numbers.point(s);
         from = aperture_point(*f_.lens, u[2], u[3]);
     }
     const DiscPoint at = disc_point(disc.lit, s, samples);
-    const Vec3 start = f_.T_world_camera.q * from;  // world axes, from the camera's centre, as the disc
+    const Vec3 start = f_.T_world_camera.q * from;  // world axes, relative to the camera's centre, as the disc is
     const Vec3 way = disc.centre + at.x * disc.right + at.y * disc.up - start;
     const double range = norm(way);
     const Vec3 direction = way / range, seen = conjugate(f_.T_world_camera.q) * direction;
@@ -184,7 +183,7 @@ void Collector::put_into(RadianceImage& out, std::vector<float>* variance) const
 
 void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out,
                          std::vector<float>* variance) {
-    std::optional<Collector> collector;  // of few blocks
+    std::optional<Collector> collector;  // constructed only for blocks that need it
     for (std::size_t body = 0; body < f.at.T_world_body.size(); ++body) {
         const auto disc =
             f.subpixel_bodies.disc_within(static_cast<int>(body), block.x_first, block.y_first,

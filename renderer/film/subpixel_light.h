@@ -6,7 +6,7 @@
 
 namespace narpa {
 
-/// A square of pixels, cut off at the image's edges, row by row.
+/// A square of pixels, clipped at the image's edges, row-major.
 struct PixelBlock {
     std::size_t n = 0;
     int x_first = 0, y_first = 0, width = 0, height = 0;
@@ -18,16 +18,16 @@ struct PixelBlock {
     }
 };
 
-/// Samples of each subpixel body's disc: spp for each pixel that its image and the lens's blur cover, within these
-/// limits. Those of a disc that is spread over several blocks are divided among them.
+/// Limits of the number of samples of each subpixel body's disc: spp for each pixel that its image and the lens's
+/// blur cover. The samples of a disc that spans several blocks are divided among them.
 inline constexpr std::uint32_t kSubpixelSamplesLeast = 1024, kSubpixelSamplesMost = 16384;
 
 /// Adds the light of the subpixel bodies in the block to its pixels, which hold the light from behind them, and
-/// subtracts what they cover. Their points are fixed on the disc, whatever pixels it falls on, so that the light
-/// does not change while the body moves through the image. Where the camera has a point spread function, a point's
-/// light is shared among pixels by cubic interpolation, so that the filtered image has its centroid where the point
-/// is. Each point represents its part of the solid angle, is traced like a camera ray and counts if it meets the
-/// body: nearer bodies hide it. `variance` may be null; it gets the variance of independent samples, an upper bound
+/// removes what they cover. The sample points are fixed on the disc, whatever pixels it falls on, so the light does
+/// not change while the body moves through the image. If the camera has a point spread function, a point's light is
+/// shared among pixels by cubic interpolation, so that the filtered image has its centroid at the point. Each point
+/// represents its part of the solid angle, is traced like a camera ray, and counts only if it hits the body, so
+/// nearer bodies occlude it. `variance` may be null; it gets the variance of independent samples, an upper bound
 /// for stratified ones.
 void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance);
 

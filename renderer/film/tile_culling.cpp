@@ -12,9 +12,9 @@ TileCulling::TileCulling(const Tracer& tracer, const Camera& camera)
       tiles_x_((camera.width + kTileSize - 1) / kTileSize),
       tiles_y_((camera.height + kTileSize - 1) / kTileSize),
       mask_(tiles_x_, tiles_y_),
-      most_listed_(std::min(kMostListed, tracer.scene().bodies.size())),
+      max_listed_(std::min(kMaxListed, tracer.scene().bodies.size())),
       listed_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
-      lists_(most_listed_ * listed_.size()) {
+      lists_(max_listed_ * listed_.size()) {
     for (const std::uint32_t body : tracer.all_bodies()) boxes_.push_back(tracer.shape(body).boxes());
 }
 
@@ -40,22 +40,22 @@ void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, cons
 }
 
 void TileCulling::list_all() noexcept {
-    std::fill(listed_.begin(), listed_.end(), static_cast<std::uint8_t>(most_listed_ + 1));
+    std::fill(listed_.begin(), listed_.end(), static_cast<std::uint8_t>(max_listed_ + 1));
 }
 
 void TileCulling::list(std::uint32_t body) noexcept {
     mask_.drain([&](int tile_x, int tile_y) {
         const std::size_t tile = index(tile_x, tile_y);
         std::uint8_t& n = listed_[tile];
-        if (n < most_listed_) lists_[most_listed_ * tile + n] = body;
-        if (n <= most_listed_) ++n;
+        if (n < max_listed_) lists_[max_listed_ * tile + n] = body;
+        if (n <= max_listed_) ++n;
     });
 }
 
 std::span<const std::uint32_t> TileCulling::bodies(int tile_x, int tile_y) const noexcept {
     const std::size_t tile = index(tile_x, tile_y), n = listed_[tile];
-    if (n > most_listed_) return tracer_.all_bodies();
-    return std::span(lists_).subspan(most_listed_ * tile, n);
+    if (n > max_listed_) return tracer_.all_bodies();
+    return std::span(lists_).subspan(max_listed_ * tile, n);
 }
 
 }  // namespace narpa

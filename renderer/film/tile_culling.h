@@ -15,20 +15,20 @@ namespace narpa {
 
 class TileCulling {
 public:
-    /// Both outlive it. Allocates here alone: about 80 bytes a tile, whatever the number of bodies.
+    /// Both arguments outlive it. Allocates only here: about 80 bytes per tile, whatever the number of bodies.
     TileCulling(const Tracer& tracer, const Camera& camera);
 
-    /// For the bodies at these places. Conservative: a ray through any point of a tile, and through any point of
-    /// the lens (null: a pinhole), that meets a body finds it in the tile's list, also where the body is as near as
-    /// the camera, behind it in part, or around it. Allocates nothing.
+    /// Updates the lists for these poses. Conservative: if a ray through any point of a tile and of the lens (null:
+    /// a pinhole) meets a body, the body is in the tile's list, also if it is as near as the camera, partly behind
+    /// it, or around it. Allocates nothing.
     void update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept;
-    /// Lists all bodies in every tile: what frames cost without culling.
+    /// Lists all bodies in every tile: no culling.
     void list_all() noexcept;
 
     /// Bodies that rays through any of the tile's pixels may meet, in ascending order. All bodies where they are
-    /// more than kMostListed.
+    /// more than kMaxListed.
     [[nodiscard]] std::span<const std::uint32_t> bodies(int tile_x, int tile_y) const noexcept;
-    static constexpr std::size_t kMostListed = 16;
+    static constexpr std::size_t kMaxListed = 16;
 
     [[nodiscard]] int tiles_x() const noexcept { return tiles_x_; }
     [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
@@ -44,10 +44,10 @@ private:
     const Camera& camera_;
     int tiles_x_, tiles_y_;
     std::vector<std::span<const BoxNode>> boxes_;  ///< of each body's shape
-    TileMask mask_;                                ///< of one body at a time
-    std::size_t most_listed_;
-    std::vector<std::uint8_t> listed_;  ///< bodies in each tile's list; most_listed_ + 1: more than it holds
-    std::vector<std::uint32_t> lists_;  ///< most_listed_ for each tile
+    TileMask mask_;                                ///< scratch, for one body at a time
+    std::size_t max_listed_;
+    std::vector<std::uint8_t> listed_;  ///< number of bodies in each tile's list; max_listed_ + 1: overflow
+    std::vector<std::uint32_t> lists_;  ///< max_listed_ for each tile
 };
 
 }  // namespace narpa

@@ -1,5 +1,5 @@
-/// renderer/film/tile_worker.h - takes a tile's samples through the renderer: gathers them into ray batches, traces
-/// them, lights several batches together and hands them to a sink. Inside frame_passes.cpp alone.
+/// renderer/film/tile_worker.h - traces and shades a tile's samples: gathers them into ray batches, traces them,
+/// shades several batches together and passes them to a sink. Used only by frame_passes.cpp.
 #pragma once
 
 #include <array>
@@ -15,14 +15,14 @@
 
 namespace narpa {
 
-/// Batches between two readings of the clock.
+/// Batches between two clock reads.
 inline constexpr std::uint32_t kBatchesPerClockRead = 16;
-/// First random sequence of centres in frames that add samples: none of a pixel's own, as the centres decide how
-/// many samples a pixel gets.
+/// First random sequence of centres in frames that add samples; distinct from those of the pixels, because the
+/// centres decide how many samples a pixel gets.
 inline constexpr std::uint32_t kFirstCentre = 0x40000000u;
 inline constexpr int kBlock = 4;
 
-/// Where one pixel represents a square of `stride` pixels: the first but one, at the image's edges the last.
+/// True for the pixel that represents a square of `stride` pixels: the second, or the last at the image's edge.
 inline bool represents(int x, int width, int stride) {
     return stride == 1 || x % stride == 1 || (x % stride == 0 && x == width - 1);
 }
@@ -44,18 +44,18 @@ struct FramePasses::Tile {
     }
 };
 
-/// Samples that have been traced together.
+/// Samples that are traced together.
 struct SampleBatch {
     CameraSamples samples;
-    Lanes<std::uint8_t> place;  ///< of each sample's pixel in the tile
+    Lanes<std::uint8_t> place;  ///< index of each sample's pixel in the tile
     std::uint32_t direct_lanes = 0,
                   path_lanes = 0;  ///< the lanes that count for this part of the light (BatchRadiance)
 };
 
-/// Of a thread, for several tiles: large.
+/// Per-task state for several tiles; large.
 class FramePasses::Worker {
 public:
-    /// Memory for batches that are lit together.
+    /// Memory for batches that are shaded together.
     template <std::size_t N>
     struct Storage {
         std::array<CameraBatch, N> traced;
@@ -71,7 +71,7 @@ public:
 
     const Frame& f;
     FrameError error;
-    bool with_paths = true;  ///< false: the direct light of a frame in two parts alone (BatchRadiance)
+    bool with_paths = true;  ///< false: only the direct part of a frame in two parts (BatchRadiance)
 
     [[nodiscard]] std::uint64_t samples_traced() const { return samples_; }
     [[nodiscard]] std::uint64_t paths_traced() const { return paths_; }
@@ -87,9 +87,9 @@ public:
             stop_.store(true, std::memory_order_relaxed);
     }
 
-    /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: its place in the tile. Paths are
-    /// traced together up to kMaxPixelSamples samples a pixel, so that neighbours can reuse them. Calls
-    /// `sink(batch, batch, light)` for the samples in order.
+    /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: the pixel's index in the tile.
+    /// Paths are traced together for up to kMaxPixelSamples samples per pixel, so that neighbours can reuse them.
+    /// Calls `sink(batch, batch, light)` for the samples in order.
     template <class Begin, class End, class Sink>
     void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Sink&& sink) {
         set_centres(false);
@@ -108,8 +108,8 @@ public:
         }
     }
 
-    /// Traces the centres of the pixels that represent squares of `stride` pixels, but for those of a pass of
-    /// stride `made` (0: none has been made).
+    /// Traces the centres of the pixels that represent squares of `stride` pixels, except those of an earlier pass
+    /// of stride `made` (0: none).
     template <class Sink>
     void centres(const Tile& tile, int width, int height, int stride, int made, Sink&& sink) {
         set_centres(true);
@@ -139,7 +139,7 @@ public:
     }
 
 private:
-    /// Samples of a pixel's sequence.
+    /// A range of a pixel's sample sequence.
     struct PixelRange {
         static constexpr std::uint32_t kAll = ~0u;
         std::uint32_t begin, end;
@@ -214,12 +214,12 @@ private:
     }
 
     const std::int64_t until_ns_;
-    std::atomic<bool>& stop_;  ///< the pass; read often, as a tile may hold many samples
+    std::atomic<bool>& stop_;  ///< aborts the pass; read often, because a tile may hold many samples
     const std::span<CameraBatch> traced_;
     const std::span<SampleBatch> batches_;
-    std::size_t full_ = 0;  ///< of these
+    std::size_t full_ = 0;  ///< number of full batches
     std::uint64_t samples_ = 0, paths_ = 0, met_ = 0, separate_ = 0;
-    std::uint32_t lit_ = 0;  ///< batches
+    std::uint32_t lit_ = 0;  ///< number of batches shaded so far
 };
 
 // From a tile's samples to the image.
@@ -228,7 +228,7 @@ inline std::size_t index_of(int x, int y, int width) {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
-/// A square of a tile's pixels, from (x, y) in it on.
+/// The block of a tile's pixels that starts at (x, y) in the tile.
 template <class Tile>
 PixelBlock block_of(const Tile& t, int x, int y) {
     PixelBlock b;
@@ -246,8 +246,8 @@ void add_subpixel_light(const Frame& f, const Tile& t, RadianceImage& out, std::
         for (int x = 0; x < t.width; x += kBlock) add_subpixel_bodies(f, block_of(t, x, y), out, variance);
 }
 
-/// Of each pixel's mean: that of independent samples, block by block, times the tile's ratio. Adds to `variance`.
-/// Pixels without samples have none; the others have equally many.
+/// Adds the variance of each pixel's mean to `variance`: that of independent samples, block by block, times the
+/// tile's VarianceRatio. Pixels without samples add nothing; all others have the same number.
 template <class Tile>
 void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const PerPixel<PixelMeans>& means,
                    PixelMean PixelMeans::*part, int image_width, std::vector<float>& variance) {
@@ -273,7 +273,7 @@ void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const Pe
     if (sampled == 0) return;
     VarianceRatio ratio;
     t.each_pixel([&](int, int, std::size_t at) { ratio.add(means[at].*part, independent[at]); });
-    // Steps of few pixels may be small by chance.
+    // The steps of a few pixels may be small by chance.
     constexpr double kPixelsAsIndependent = 4;
     const auto n = static_cast<double>(sampled);
     const bool all = sampled == static_cast<std::size_t>(t.width * t.height);
@@ -284,7 +284,7 @@ void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const Pe
     });
 }
 
-/// The same where pixels have samples of their own number, or show their centres.
+/// Sets the variance where pixels have different numbers of samples, or show their centres.
 template <class Tile>
 void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileContrast& contrast, int image_width,
                    std::vector<float>& variance) {
@@ -302,7 +302,7 @@ void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileC
         ratio_of_path.add(means[at].path, of_mean(means[at].path, of_path(at)));
     });
     const double direct = ratio_of_direct.value(), path = ratio_of_path.value();
-    // Contrasts know nothing of what lies between the pixels' centres: a glint shows in the steps alone.
+    // Contrasts do not see anything between the pixels' centres, such as a glint; the steps do.
     const auto at_least = [](const PixelMean& mean, double expected) {
         if (mean.count() < 2) return expected;
         return std::max(expected, static_cast<double>(mean.step()) * static_cast<double>(mean.step()));
@@ -320,7 +320,7 @@ inline Rgb radiance_at(const GBufferTile& tile, std::size_t place) {
     return {tile.r[place], tile.g[place], tile.b[place]};
 }
 
-/// Asks for the memory of a tile's pixels, so that it is there when they have been traced.
+/// Prefetches the memory of a tile's pixels.
 template <class Tile>
 void prefetch_pixels(const Tile& t, const RadianceImage& out) {
     constexpr int kPixelsPerLine = 64 / static_cast<int>(sizeof(Rgb));
@@ -329,7 +329,7 @@ void prefetch_pixels(const Tile& t, const RadianceImage& out) {
             __builtin_prefetch(&out.pixels[index_of(t.x + x, t.y + y, out.width)], 1);
 }
 
-/// Four pixels, band by band, as they lie in an image.
+/// Four pixels from separate bands, interleaved.
 inline std::array<Rgb, kBlock> interleave(const float* red, const float* green, const float* blue) {
     using Four [[gnu::vector_size(16)]] = float;
     static_assert(kBlock == 4 && sizeof(Rgb) == 3 * sizeof(float));
@@ -343,7 +343,7 @@ inline std::array<Rgb, kBlock> interleave(const float* red, const float* green, 
     return std::bit_cast<std::array<Rgb, kBlock>>(mixed);
 }
 
-/// A tile's pixels, band by band.
+/// Writes a tile's pixels, given band by band, to the image.
 template <class Tile>
 void put_pixels(const Tile& t, const PerPixel<float>& r, const PerPixel<float>& g, const PerPixel<float>& b,
                 RadianceImage& out) {

@@ -21,14 +21,14 @@ public:
     /// constant rates.
     void set(std::size_t body, const Rigid3& start, const Rigid3& end) noexcept;
 
-    /// Does any body, or this one, move within the exposure?
+    /// Whether any body, or this one, moves within the exposure.
     [[nodiscard]] bool moving() const noexcept { return moving_ > 0; }
     [[nodiscard]] bool moves(std::size_t body) const noexcept { return moving_ > 0 && paths_[body].moves; }
-    /// At 0 and 1 exactly the start and the end.
+    /// Exactly the start pose at 0 and the end pose at 1.
     [[nodiscard]] Rigid3 T_world_body_at(std::size_t body, double time) const noexcept {
         return moves(body) ? paths_[body].pose_at(time) : T_world_body[body];
     }
-    /// Where the body's origin is, world.
+    /// Position of the body's origin, world.
     [[nodiscard]] Vec3 position_at(std::size_t body, double time) const noexcept {
         return moves(body) ? paths_[body].position_at(time) : T_world_body[body].t;
     }

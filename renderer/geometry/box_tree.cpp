@@ -1,4 +1,4 @@
-// Boxes about the parts of a mesh, from one about all of it down to a few thousand.
+// The tree of bounding boxes of a mesh: from one box of the whole mesh down to a few thousand leaves.
 #include <algorithm>
 #include <limits>
 #include <queue>
@@ -11,9 +11,9 @@ namespace narpa {
 namespace {
 
 constexpr std::size_t kBins = 16;
-constexpr float kPieceShare = 1.0f / 160;  ///< a piece's box has a surface like this square of the mesh's extent
-constexpr int kMostHalvings = 13;          ///< of one triangle
-constexpr float kMostPieces = 65536;       ///< roughly, that large triangles are cut to
+constexpr float kPieceShare = 1.0f / 160;  ///< root of a piece's largest half surface, of the mesh's extent
+constexpr int kMaxHalvings = 13;           ///< most recursive halvings of a triangle
+constexpr float kMaxPieces = 65536;        ///< approximate limit for pieces of large triangles
 constexpr std::size_t kCells = 256;        ///< of the grid, along the mesh's largest extent
 
 struct Box {
@@ -30,7 +30,7 @@ struct Box {
         for (std::size_t k = 0; k < 3; ++k)
             low[k] = std::min(low[k], b.low[k]), high[k] = std::max(high[k], b.high[k]);
     }
-    /// Half of it; of an empty box 0.
+    /// Half of the surface area; 0 for an empty box.
     [[nodiscard]] float surface() const {
         if (!(high[0] >= low[0])) return 0;
         const float x = high[0] - low[0], y = high[1] - low[1], z = high[2] - low[2];
@@ -42,13 +42,13 @@ struct Box {
 
 using TriangleCorners = std::array<Vec3f, 3>;
 
-/// Of `steps` from 0 on, also for what is not a number, as the difference of the largest numbers.
+/// Truncates x to a step from 0 to steps - 1; NaN, as from overflow, gives 0.
 std::size_t step_at(float x, std::size_t steps) {
     return x > 0 ? static_cast<std::size_t>(std::min(x, static_cast<float>(steps - 1))) : 0;
 }
 
-/// Boxes of the triangles; of large ones, of what is left when they are halved across their longest side. Those
-/// whose middles share a cell of a grid, much smaller than the leaves, are one.
+/// Bounding boxes of the triangles. Large triangles are first halved across their longest side, recursively. Boxes
+/// whose centres share a cell of a grid, much smaller than the leaves, are merged.
 class Pieces {
 public:
     explicit Pieces(const Mesh& mesh) {
@@ -58,9 +58,9 @@ public:
         float surfaces = 0;
         for (const auto& f : mesh.faces) surfaces += box_of(corners(mesh, f)).surface();
         const float extent = all_.extent();
-        largest_ = std::max(kPieceShare * extent * kPieceShare * extent, surfaces / kMostPieces);
+        largest_ = std::max(kPieceShare * extent * kPieceShare * extent, surfaces / kMaxPieces);
         cells_per_metre_ = extent > 0 ? kCells / extent : 0;
-        for (const auto& f : mesh.faces) cut(corners(mesh, f), kMostHalvings);
+        for (const auto& f : mesh.faces) cut(corners(mesh, f), kMaxHalvings);
     }
     [[nodiscard]] std::vector<Box>& boxes() { return boxes_; }
     [[nodiscard]] const Box& all() const { return all_; }
@@ -115,9 +115,9 @@ struct Part {
     }
 };
 
-/// The cheapest of kBins - 1 planes across each axis, after I. Wald, "On fast construction of SAH-based bounding
-/// volume hierarchies" (2007). Puts the pieces on its lower side first and returns how many; 0 where none parts
-/// them.
+/// Splits at the plane of least cost by the surface area heuristic, of kBins - 1 planes on each axis, after I.
+/// Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007). Moves the pieces on its lower side
+/// to the front and returns their number; 0 if no plane separates the pieces.
 std::size_t part(std::span<Box> pieces) {
     Box middles;
     for (const Box& p : pieces) middles.add(Vec3f{p.middle(0), p.middle(1), p.middle(2)});

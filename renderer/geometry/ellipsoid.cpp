@@ -13,7 +13,7 @@ public:
         properties_ = {{}, radius_m, radiance * std::numbers::pi * std::cbrt(std::pow(a.x * a.y * a.z, 2))};
     }
 
-    /// Convex: it does not light itself from outside, and from inside every direction meets it anyway.
+    /// The shape is convex: it does not light its own outer side, and from inside every direction hits it anyway.
     [[nodiscard]] bool is_worth_sampling(const EmitterView& view) const noexcept override {
         return !view.own && Cone(*this, view.to_body(view.way_to({}))).distance2 > 1;
     }
@@ -24,8 +24,8 @@ public:
             Basis(normalized(cone.towards)).to_world(direction_at(std::sqrt(drop * (2 - drop)), 1 - drop, v));
         return {view.q_world_body * normalized(scaled * semi_axes_m_)};
     }
-    /// Of an even choice in the cone. A linear map A takes the scaled solid angle to |det A| / |A w|^3 times as
-    /// much.
+    /// Density of a uniform choice in the cone of the scaled frame. A linear map A multiplies the solid angle about
+    /// w by |det A| / |A w|^3.
     [[nodiscard]] double pdf(const EmitterView& view, const Vec3& direction, const Hit&) const noexcept override {
         const Cone cone(*this, view.to_body(view.way_to({})));
         const double shrink = norm(view.to_body(direction) / semi_axes_m_);
@@ -34,10 +34,11 @@ public:
     }
 
 private:
-    /// Seen from outside, in the body's frame with its axes scaled to 1: the cone of directions that meet it.
+    /// The cone of directions that hit the shape, seen from outside, in the body's frame scaled so that the shape
+    /// is the unit sphere.
     struct Cone {
         Vec3 towards{};            ///< from the receiver to the centre, scaled
-        double distance2 = 0;      ///< of the scaled centre; not above 1 from inside
+        double distance2 = 0;      ///< of the scaled centre; at most 1 from inside
         double one_minus_cos = 0;  ///< of the cone's half angle
 
         Cone(const EllipsoidEmission& e, const Vec3& to_centre_body)
@@ -55,7 +56,7 @@ private:
 EllipsoidShape::EllipsoidShape(const Vec3& semi_axes_m, int material, bool textured)
     : semi_axes_m_(semi_axes_m),
       radius_m_(std::max({semi_axes_m.x, semi_axes_m.y, semi_axes_m.z})),
-      squeeze_{radius_m_ / semi_axes_m.x, radius_m_ / semi_axes_m.y, radius_m_ / semi_axes_m.z},
+      scale_to_sphere_{radius_m_ / semi_axes_m.x, radius_m_ / semi_axes_m.y, radius_m_ / semi_axes_m.z},
       material_(material),
       textured_(textured) {
     properties_ = {.radius_m = radius_m_,
@@ -132,7 +133,7 @@ void EllipsoidShape::surface(const ShapeHits& found, std::uint32_t wanted, HitBa
     });
 }
 
-/// At a pole u turns on the spot, and v runs along the meridian of u = 0.
+/// At a pole dp_du is 0, and dp_dv is along the meridian of u = 0.
 TextureFrame EllipsoidShape::texture_frame(const Hit& hit) const noexcept {
     const Vec3 n = normal(hit.departure_body);
     const double s = std::hypot(n.x, n.y), cos_longitude = s > 0 ? n.x / s : 1, sin_longitude = s > 0 ? n.y / s : 0;

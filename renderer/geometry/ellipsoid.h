@@ -1,7 +1,8 @@
 /// renderer/geometry/ellipsoid.h - a sphere or ellipsoid about its body's origin, solved in double.
 ///
-/// Squeezed along its axes it is the sphere of its largest semi-axis, and lines stay lines: it is solved there,
-/// with a direction that is no longer unit. A sphere is squeezed by exactly 1, so nothing is rounded for it.
+/// Intersections are solved in a frame scaled along the axes so that the ellipsoid is a sphere of its largest
+/// semi-axis; the direction is not unit there. For a sphere the scale is exactly 1, so that scaling causes no
+/// rounding.
 #pragma once
 
 #include <algorithm>
@@ -33,35 +34,38 @@ public:
     [[nodiscard]] TextureFrame texture_frame(const Hit& hit) const noexcept override;
     [[nodiscard]] std::unique_ptr<const EmissiveSurface> emission(const Scene& scene) const override;
 
-    /// The nearest crossing that is not behind the ray. Branch-free, as all that follows, for loops over lanes.
+    /// The nearest crossing that is not behind the ray's origin. Branch-free, as all that follows, for loops over
+    /// lanes.
     [[nodiscard]] Crossing first_crossing(const Vec3& o, const Vec3& d) const noexcept {
-        const SphereRoots roots = sphere_roots(o * squeeze_, d * squeeze_, radius_m_);
+        const SphereRoots roots = sphere_roots(o * scale_to_sphere_, d * scale_to_sphere_, radius_m_);
         const bool outside = roots.near >= 0;
         const double ahead = roots.far >= 0 ? roots.far : kInfinity;
         return {outside ? roots.near : ahead, outside};
     }
 
-    /// As above for a ray that leaves the surface at `start`. The shape is convex: from its outer side the ray
-    /// hits it only by starting into it, from its inner side it hits the other end of the chord. Both starts are
-    /// at range 0.
+    /// The same for a ray that leaves the surface at `start`. The shape is convex: a ray that leaves its outer side
+    /// hits it only if it points inwards, at range 0; one that leaves its inner side hits the other end of the
+    /// chord, at range 0 if it points outwards.
     [[nodiscard]] Crossing own_crossing(const Vec3& start, const Vec3& d, bool outside) const noexcept {
-        const Vec3 o = start * squeeze_, e = d * squeeze_;
+        const Vec3 o = start * scale_to_sphere_, e = d * scale_to_sphere_;
         const double up = dot(o, e), chord = std::max(0.0, -2 * up / dot(e, e));
         const double inwards = up < 0 ? 0 : kInfinity;
         return {outside ? inwards : chord, outside};
     }
 
-    /// Outward, unit.
-    [[nodiscard]] Vec3 normal(const Vec3& p) const noexcept { return normalized(p * squeeze_ * squeeze_); }
+    /// Outward unit normal at p.
+    [[nodiscard]] Vec3 normal(const Vec3& p) const noexcept {
+        return normalized(p * scale_to_sphere_ * scale_to_sphere_);
+    }
 
-    /// The point of the surface towards which p lies, seen from the centre of the squeezed sphere.
+    /// Projects p onto the surface along the line through the centre.
     [[nodiscard]] Vec3 onto_surface(const Vec3& p) const noexcept {
-        const Vec3 q = p * squeeze_;
+        const Vec3 q = p * scale_to_sphere_;
         return (1 / norm(q)) * q * semi_axes_m_;
     }
 
-    /// Texture coordinates where this is the outward normal: its longitude from +x towards +y and its latitude,
-    /// which on an ellipsoid is the geodetic one of maps; v = 1 at +z.
+    /// Texture coordinates of the point with the outward normal n: u is its longitude from +x towards +y, v its
+    /// geodetic latitude, 1 at +z.
     [[nodiscard]] static std::array<double, 2> uv(const Vec3& n) noexcept {
         const double colatitude = std::atan2(std::hypot(n.x, n.y), n.z), longitude = std::atan2(n.y, n.x);
         const double u = longitude / (2 * std::numbers::pi);
@@ -73,8 +77,8 @@ private:
     void fill_surface(const ShapeHits& found, HitBatch& hits) const noexcept;
 
     Vec3 semi_axes_m_;
-    double radius_m_;  ///< largest semi-axis
-    Vec3 squeeze_;     ///< radius over semi-axes
+    double radius_m_;       ///< largest semi-axis
+    Vec3 scale_to_sphere_;  ///< scale to the sphere: radius over semi-axes
     int material_;
     bool textured_;
 };

@@ -33,10 +33,10 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) noexcept {
 #endif
 }
 
-/// How the rays of a packet run.
+/// Whether the rays of a packet are coherent.
 enum class Run { together, apart };
 
-/// Sixteen rays; lanes whose `valid` is 0 are left alone, others have -1.
+/// Sixteen rays. `valid`: -1 for the lanes to trace, 0 for those to skip.
 inline void intersect(RTCScene scene, const int* valid, RTCRayHit16& rays, Run run) noexcept {
 #if NARPA_EMBREE_MAJOR >= 4
     RTCIntersectArguments arguments;
@@ -51,7 +51,7 @@ inline void intersect(RTCScene scene, const int* valid, RTCRayHit16& rays, Run r
 #endif
 }
 
-/// What becomes of ray.tfar when anything is hit.
+/// The value of ray.tfar after an occluded ray.
 inline constexpr float kOccluded = -std::numeric_limits<float>::infinity();
 
 inline void occluded(RTCScene scene, RTCRay& ray) noexcept {
@@ -65,7 +65,7 @@ inline void occluded(RTCScene scene, RTCRay& ray) noexcept {
 }
 
 /// Sixteen shadow rays. With instances in the scene the coherent flag must not be set here: Embree 3.13 then loops
-/// for ever where there is AVX-512. No scene of ours has any.
+/// for ever where there is AVX-512. narpa uses no instances.
 inline void occluded(RTCScene scene, const int* valid, RTCRay16& rays, Run run) noexcept {
 #if NARPA_EMBREE_MAJOR >= 4
     RTCOccludedArguments arguments;

@@ -1,4 +1,4 @@
-/// renderer/geometry/flush_denormals.h - denormal floats count as zero while this lives, as Embree advises.
+/// renderer/geometry/flush_denormals.h - flushes denormal floats to zero during its lifetime, as Embree advises.
 #pragma once
 
 #if defined(__SSE2__)

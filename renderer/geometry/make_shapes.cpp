@@ -1,4 +1,4 @@
-// The shapes of a scene's bodies.
+// Makes the shapes of a scene's bodies.
 #include <tbb/task_arena.h>
 
 #include "renderer/geometry/ellipsoid.h"
@@ -10,7 +10,7 @@ namespace {
 
 using ShapePointer = std::shared_ptr<const Shape>;
 
-/// The kinds of Body::shape, each as its shape.
+/// Visitor of Body::shape that makes the shape of each kind.
 class ShapeOf {
 public:
     ShapeOf(const Scene& scene, const std::vector<ShapePointer>& meshes, const Body& body)
@@ -51,7 +51,7 @@ private:
 }  // namespace
 
 Result<Shapes> make_shapes(const Scene& scene, const Shapes& given, RTCDevice device, int threads) {
-    // Embree's own "threads" setting would bound TBB for the whole process; an arena bounds the builds alone.
+    // Embree's own "threads" setting would limit TBB for the whole process; an arena limits the builds alone.
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     std::vector<ShapePointer> meshes;
     for (const Mesh& m : scene.meshes) {

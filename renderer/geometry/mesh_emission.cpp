@@ -1,4 +1,4 @@
-// The faces of a mesh that shine.
+// The emissive faces of a mesh, as a light source.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -15,7 +15,7 @@ public:
     MeshEmission(const Scene& scene, const Mesh& mesh) : scene_(scene), mesh_(mesh) {
         double sum = 0;
         for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
-            // A texture counts as white: it can only darken, so that all that shines can be chosen.
+            // A texture counts as white, which is its upper bound, so that every emissive face can be chosen.
             const double radiance = radiance_of(mesh.face_material[f]);
             const double area = 0.5 * norm(cross(corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0)));
             if (!(radiance > 0) || !(area > 0)) continue;

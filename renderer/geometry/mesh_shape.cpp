@@ -32,9 +32,9 @@ Status check_mesh(const Scene& scene, const Mesh& mesh) {
     return Ok{};
 }
 
-/// The ellipsoid in the proportions of the bounding box, about its centre, just large enough for the vertices: for
-/// a box its outline is up to 2.4 times as large as the box's own. A flat mesh keeps a thousandth of its largest
-/// extent in thickness.
+/// The smallest ellipsoid that holds all vertices, of those with the centre and the proportions of the bounding
+/// box. For a box its outline is up to 2.4 times as large as the box's own. A flat mesh keeps a thousandth of its
+/// largest extent in thickness.
 BodyBounds ellipsoid_about(const Mesh& mesh) {
     Vec3 low{kInfinity, kInfinity, kInfinity}, high = -low;
     const auto for_each_vertex = [&](const auto& f) {
@@ -112,7 +112,7 @@ Status MeshShape::build_hierarchy(RTCDevice device) {
                                 3 * sizeof(std::uint32_t), std::max<std::size_t>(1, mesh_.faces.size())));
     if (vertices == nullptr || indices == nullptr)
         return failed("has no memory for " + std::to_string(mesh_.faces.size()) + " triangles");
-    vertices[mesh_.positions.size()] = {};  // the only one of a mesh without any; read with the one before it
+    vertices[mesh_.positions.size()] = {};  // padding: each vertex is read with four bytes behind it
     indices[0] = {0, 0, 0};
     for (std::size_t i = 0; i < mesh_.positions.size(); ++i)
         vertices[i] = vec_cast<float>(vec_cast<double>(mesh_.positions[i]) + (mesh_.origin_m - vertex_origin_));
@@ -137,7 +137,7 @@ std::vector<BoxNode> MeshShape::make_boxes() const {
     if (mesh_.faces.empty()) return {BoxNode{}};
     std::vector<BoxNode> boxes = box_tree(mesh_);
     if (mesh_.origin_m == Vec3{}) return boxes;
-    constexpr double kRounding = 0x1p-23;  // of the larger of the coordinates, both ways
+    constexpr double kRounding = 0x1p-23;  // relative rounding error in single precision, either way
     for (BoxNode& b : boxes)
         for (std::size_t k = 0; k < 3; ++k) {
             const double origin = mesh_.origin_m[static_cast<int>(k)];

@@ -1,4 +1,5 @@
-/// renderer/geometry/mesh_shape.h - triangles: found by Embree in single precision, solved again in double.
+/// renderer/geometry/mesh_shape.h - triangle meshes: Embree finds hits in single precision, which are solved again
+/// in double.
 #pragma once
 
 #include <memory>
@@ -13,18 +14,18 @@
 
 namespace narpa {
 
-/// A tree of boxes, root first, every node before its children; empty for a mesh without faces. Each triangle, to
-/// rounding in single precision, lies in the union of the leaves, in pieces where it is large: a box about a whole
-/// panel that stands askew would hold mostly nothing. Boxes are cut one at a time, the one with the largest surface
-/// first, where the surfaces of the halves weigh least (J. Goldsmith, J. Salmon, "Automatic creation of object
-/// hierarchies for ray tracing", IEEE CG&A 7(5), 1987), so that the leaves are of like size.
+/// A tree of boxes, root first, every node before its children; empty for a mesh without faces. The union of the
+/// leaves covers each triangle, to rounding in single precision. Large triangles are split first, as the box of a
+/// whole oblique panel would be mostly empty. Boxes are split one at a time, the one with the largest surface
+/// first, at the plane of least cost by the surface area heuristic (J. Goldsmith, J. Salmon, "Automatic creation of
+/// object hierarchies for ray tracing", IEEE CG&A 7(5), 1987), so that the leaves have similar sizes.
 [[nodiscard]] std::vector<BoxNode> box_tree(const Mesh& mesh);
 
-/// Every edge is passed as often in one direction as in the other, with vertices identified by position alone: a
-/// ray that meets the mesh from outside meets its outer side first. Several shells may be closed together.
+/// Whether every edge occurs equally often in both directions, with vertices identified by position alone: then a
+/// ray from outside hits an outer side first. A closed mesh may have several shells.
 [[nodiscard]] bool is_closed(const Mesh& mesh);
 
-/// The faces that shine; null where none does. Scene and mesh must outlive it.
+/// The emissive faces; null if there are none. Scene and mesh must outlive it.
 [[nodiscard]] std::unique_ptr<const EmissiveSurface> mesh_emission(const Scene& scene, const Mesh& mesh);
 
 class MeshShape final : public Shape {
@@ -40,8 +41,8 @@ public:
         return trace_shadows(rays, wanted);
     }
     void surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept override;
-    /// Lifted by as much as rounding in single precision can lower a start, and kept so far from the face's edges
-    /// that the lift does not take it through a neighbour at an angle of 7 degrees or more.
+    /// Starts are offset along the normal by the bound of their rounding error in single precision, and kept so far
+    /// from the face's edges that the offset does not cross a neighbouring face that meets it at 7 degrees or more.
     void depart(const SurfacePoints& points, std::uint32_t wanted, Vec3Lanes& starts) const noexcept override {
         lift(points, wanted, starts);
     }
@@ -55,7 +56,7 @@ private:
     MeshShape(const Scene& scene, const Mesh& mesh);
     [[nodiscard]] std::vector<BoxNode> make_boxes() const;
     Status build_hierarchy(RTCDevice device);
-    /// Three corners, as the hierarchy holds them.
+    /// Corners of a face, as stored in Embree's hierarchy.
     [[nodiscard]] Triangle triangle(std::uint32_t face) const noexcept {
         const auto& f = mesh_.faces[face];
         return {vec_cast<double>(vertices_[f[0]]) + vertex_origin_,
@@ -73,13 +74,13 @@ private:
         float t = 0, u = 0, v = 0;
         bool hit = false, back = false;
     };
-    /// Sixteen rays from where Embree takes over, and its hits.
+    /// Sixteen rays, advanced to where Embree starts, and Embree's hits.
     struct EmbreeBatch {
         RTCRayHit16 rays;
         alignas(64) Lanes<int> valid;  ///< -1: to be traced
         Vec3Lanes start;
         Lanes<double> skipped_m;          ///< from the ray's origin to `start`
-        std::uint32_t traced = 0;         ///< as `valid`
+        std::uint32_t traced = 0;         ///< bits of `valid`
         std::uint32_t hit = 0, back = 0;  ///< out
 
         void clear_hits() noexcept;
@@ -92,7 +93,7 @@ private:
     /// closed mesh.
     void retry(const ShapeRays& rays, std::uint32_t suspicious, std::uint32_t inside,
                EmbreeBatch& batch) const noexcept;
-    /// Is the turned ray's hit the better one for the ray itself?
+    /// Whether the hit of the turned ray replaces that of the original one.
     [[nodiscard]] bool is_better(const EmbreeHit& turned, const EmbreeHit& than, const Vec3& start,
                                  const Vec3& direction, bool inside) const noexcept;
 

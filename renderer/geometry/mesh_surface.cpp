@@ -1,11 +1,11 @@
-// The surface of a mesh at hits: position, normals, texture coordinates, and where rays that leave start.
+// The surface of a mesh at hits: position, normals, texture coordinates, and the starts of rays that leave.
 #include "base/each_isa.h"
 #include "renderer/geometry/mesh_shape.h"
 
 namespace narpa {
 namespace {
 
-/// Of three vertices' texture coordinates.
+/// Barycentric interpolation of three vertices' texture coordinates.
 float interpolate(const TrianglePoint& p, float a, float b, float c) {
     return static_cast<float>((1 - p.b1 - p.b2) * static_cast<double>(a) + p.b1 * static_cast<double>(b) +
                               p.b2 * static_cast<double>(c));
@@ -15,7 +15,7 @@ float interpolate(const TrianglePoint& p, float a, float b, float c) {
 
 /// Normals and texture coordinates at the three vertices of each ray's face.
 struct alignas(64) MeshShape::VertexLanes {
-    bool textured = false;  ///< else there is nothing in uv
+    bool textured = false;  ///< else uv is not set
     std::array<Lanes<float>, 9> normal;
     std::array<Lanes<float>, 6> uv;
 

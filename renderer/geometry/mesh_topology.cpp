@@ -1,4 +1,4 @@
-// Is a mesh a closed surface?
+// Tests whether a mesh is a closed surface.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -9,7 +9,8 @@
 namespace narpa {
 namespace {
 
-/// The same number for vertices at the same place: readers split a vertex where its normal or texture jumps.
+/// A number for each vertex, the same for vertices at the same position: readers split a vertex where its normal or
+/// texture coordinates are discontinuous.
 std::vector<std::uint32_t> welded(const std::vector<Vec3f>& positions) {
     constexpr std::uint32_t kFree = 0xffff'ffffu;
     const auto key = [&](std::size_t i) {
@@ -41,7 +42,7 @@ bool is_closed(const Mesh& mesh) {
                 a < b ? f(a, b, 0u) : f(b, a, 1u);
             }
     };
-    // Edges by their smaller vertex: each one's larger vertex, and in the last bit its direction.
+    // Edges grouped by their smaller vertex: each entry is the larger vertex, with the direction in the last bit.
     std::vector<std::uint32_t> first(mesh.positions.size() + 2, 0);
     for_each_edge([&](std::uint32_t smaller, std::uint32_t, std::uint32_t) { ++first[smaller + 2]; });
     for (std::size_t v = 2; v < first.size(); ++v) first[v] += first[v - 1];

@@ -1,4 +1,4 @@
-// Sixteen rays into a mesh at a time.
+// Traces batches of sixteen rays through a mesh.
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -13,17 +13,17 @@ namespace {
 
 constexpr double kLongest_m = std::numeric_limits<float>::max();
 
-// Even in robust mode Embree loses some rays that hit a vertex (its issues 181, 188 and 387): they pass through,
-// and where the mesh is closed they next hit a back face, or from inside nothing. They are common where a camera's
-// pixels line up with a model's grid. The same ray turned by a few roundings finds what was lost; one that leaves
-// the inner side close to an edge and runs along it needs to be turned by more.
+// Even in robust mode Embree misses some hits at a vertex (its issues 181, 188 and 387): in a closed mesh the ray
+// next hits a back face, or from inside nothing. This is common where a camera's pixels line up with a model's
+// grid. Such a ray is traced again, turned by a few rounding errors; one that leaves the inner side close to an
+// edge and runs along it needs a larger turn.
 constexpr std::array kTurns{4e-7, -4e-7, 4e-3, -4e-3};  // radians
 
 Vec3 turned(const Vec3& d, double angle) {
     return d + angle * Vec3{d.y - d.z, d.z - d.x, d.x - d.y + 0.5};
 }
 
-/// The corners of faces, as the hierarchy holds them.
+/// The corners of faces, as stored in Embree's hierarchy.
 struct alignas(64) Corners {
     std::array<Lanes<float>, 9> at;
 
@@ -35,8 +35,8 @@ struct alignas(64) Corners {
 
 using Four [[gnu::vector_size(16)]] = float;
 
-/// By plain loads, and apart from the loops around it lest the compiler choose the processor's own gathers, which
-/// are slower. Four vertices at a time, each read with the four bytes behind it, are turned into x, y and z.
+/// Gathers corners by plain loads. Not inlined, lest the compiler use gather instructions, which are slower. Four
+/// vertices at a time, each read with the four bytes behind it, are transposed into x, y and z.
 [[gnu::noinline]] void gather(const Mesh& mesh, const Vec3f* vertices, const std::uint32_t* face,
                               std::uint32_t wanted, Corners& out) noexcept {
     Lanes<const std::uint32_t*> faces;
@@ -98,8 +98,8 @@ inline void MeshShape::EmbreeBatch::put(std::size_t i, const EmbreeHit& h) noexc
     back = (back & ~(1u << i)) | static_cast<std::uint32_t>(h.back) << i;
 }
 
-/// Where Embree takes over: at the entry, or at the entry of the tighter sphere about the mesh's own centre where
-/// that is worth while.
+/// Advances the rays to where Embree starts: the entry into the bounding sphere or, where it is clearly smaller,
+/// into the sphere about the mesh's own centre.
 inline void MeshShape::advance(const ShapeRays& rays, std::uint32_t wanted, EmbreeBatch& batch) const noexcept {
     Lanes<double> entry_m = rays.entry_m;
     if (off_centre_)
@@ -121,8 +121,8 @@ inline void MeshShape::advance(const ShapeRays& rays, std::uint32_t wanted, Embr
         to.dir_x[i] = static_cast<float>(d.x);
         to.dir_y[i] = static_cast<float>(d.y);
         to.dir_z[i] = static_cast<float>(d.z);
-        // A lane that is not traced holds a ray of no length: where the processor has no sixteen lanes, Embree 3.13
-        // reads these too.
+        // An inactive lane holds an empty ray (tfar < tnear): on processors without vectors of sixteen lanes Embree
+        // 3.13 reads these too.
         to.tfar[i] = static_cast<float>(choose(valid, std::min(rays.t_max[i] - skipped_m, kLongest_m), -1));
         to.tnear[i] = 0;
         to.time[i] = 0;
@@ -196,7 +196,7 @@ void MeshShape::retry(const ShapeRays& rays, std::uint32_t suspicious, std::uint
             if (!is_set(suspicious, i)) continue;
             const bool within = is_set(inside, i);
             if (is_better(again[i], batch[i], batch.start[i], rays.direction[i], within)) batch.put(i, again[i]);
-            // From outside one retry will do: there a ray may well hit inner sides, as in a room.
+            // From outside one retry is enough: such a ray may rightly hit inner sides, as in a room.
             if (!within || (is_set(batch.hit, i) && is_set(batch.back, i))) suspicious &= ~(1u << i);
         }
         if (suspicious == 0) return;
@@ -208,7 +208,7 @@ bool MeshShape::is_better(const EmbreeHit& turned, const EmbreeHit& than, const 
     if (!turned.hit || (than.hit && !(turned.back == inside && turned.t < than.t))) return false;
     const Triangle t = triangle(turned.face);
     const Vec3 n = t.normal();
-    return inside || dot(n, t.a - start) * dot(n, direction) >= 0;  // ahead of the ray itself, too
+    return inside || dot(n, t.a - start) * dot(n, direction) >= 0;  // ahead of the original ray, too
 }
 
 NARPA_EACH_ISA std::uint32_t MeshShape::trace_shadows(const ShapeRays& rays, std::uint32_t wanted) const noexcept {
@@ -242,7 +242,7 @@ NARPA_EACH_ISA void MeshShape::lift(const SurfacePoints& points, std::uint32_t w
                 const Triangle t = triangle(points.face[i]);
                 const Vec3 p = points.departure_body[i];
                 const Departure d = departure_from(t, p, p - vertex_origin_);
-                // Above the face it is clear of the edges, and may lie beside it (SurfacePoints::departure_body).
+                // A point above the face, on the smooth surface, is clear of the edges and may lie beside the face.
                 if (std::abs(dot(d.normal, p - t.a)) > d.clearance_m) continue;
                 starts.put(
                     i, away_from_edges(t, p, d) + (is_set(points.outside, i) ? d.lift_m : -d.lift_m) * d.normal);

@@ -5,7 +5,7 @@
 namespace narpa {
 namespace {
 
-constexpr double kShortChord2 = 1e-6;  ///< up to which slerp is its series
+constexpr double kShortChord2 = 1e-6;  ///< squared chord up to which slerp uses its series
 
 NARPA_EACH_ISA void go_straight(const Vec3& start, const Vec3& end, const Lanes<double>& time,
                                 Vec3Lanes& __restrict position) {
@@ -13,7 +13,7 @@ NARPA_EACH_ISA void go_straight(const Vec3& start, const Vec3& end, const Lanes<
     for (std::size_t i = 0; i < kLanes; ++i) position.put(i, choose(time[i] == 1, end, start + time[i] * way));
 }
 
-/// As slerp and without its branches; `near` is `end` with the sign that is nearer to `start`.
+/// Slerp without branches; `near` is `end` with the sign that is nearer to `start`.
 NARPA_EACH_ISA void turn_slightly(const Quat& start, const Quat& near, const Quat& end, double chord2,
                                   const Lanes<double>& time, PoseLanes& __restrict T) {
     for (std::size_t i = 0; i < kLanes; ++i) {

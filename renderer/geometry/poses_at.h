@@ -6,9 +6,9 @@
 
 namespace narpa {
 
-/// BodyPoses::T_world_body_at each moment, to the last bit.
+/// Calls BodyPoses::T_world_body_at for each time; the results are equal bit for bit.
 void poses_at(const BodyPoses& at, std::size_t body, const Lanes<double>& time, PoseLanes& T_world_body) noexcept;
-/// BodyPoses::position_at each moment, to the last bit.
+/// The same for BodyPoses::position_at.
 void positions_at(const BodyPoses& at, std::size_t body, const Lanes<double>& time, Vec3Lanes& position) noexcept;
 
 }  // namespace narpa

@@ -19,21 +19,21 @@ struct Ray {
 /// One lane of a HitBatch: the nearest surface along a ray. `body` < 0: nothing was hit and the rest is undefined.
 struct Hit {
     int body = -1;
-    std::uint32_t face = 0;      ///< triangle of a mesh; 0 on an ellipsoid
-    double range_m = 0;          ///< from the ray's origin
-    Vec3 position{};             ///< world, metres
-    Vec3 geometric_normal{};     ///< world, unit, towards the ray's origin
-    Vec3 shading_normal{};       ///< world, unit, same side
-    float u = 0, v = 0;          ///< texture coordinates; 0 where the material has no texture
-    int material = 0;            ///< index into Scene::materials
-    bool outside = true;         ///< the ray came from the outer side, by the winding of the face
-    Vec3 departure_body{};       ///< body frame: where rays that leave start, before the offset for rounding: the
-                                 ///< position, or above it on the smooth surface that vertex normals describe
-    Vec3 beyond_body{};          ///< the same for rays that leave on the other side
+    std::uint32_t face = 0;   ///< triangle of a mesh; 0 on an ellipsoid
+    double range_m = 0;       ///< from the ray's origin
+    Vec3 position{};          ///< world, metres
+    Vec3 geometric_normal{};  ///< world, unit, towards the ray's origin
+    Vec3 shading_normal{};    ///< world, unit, same side
+    float u = 0, v = 0;       ///< texture coordinates; 0 where the material has no texture
+    int material = 0;         ///< index into Scene::materials
+    bool outside = true;      ///< the ray came from the outer side, by the winding of the face
+    Vec3 departure_body{};  ///< body frame: start of rays that leave, before the offset for rounding: the position,
+                            ///< or a point above it on the smooth surface of the vertex normals
+    Vec3 beyond_body{};     ///< the same for rays that leave on the other side
     double time = kMidExposure;  ///< of the ray
 };
 
-/// The same point, left on its other side: for light that goes through.
+/// The same point with its sides swapped: for transmitted light.
 [[nodiscard]] inline Hit other_side(const Hit& hit) noexcept {
     Hit other = hit;
     other.geometric_normal = -hit.geometric_normal;
@@ -61,7 +61,7 @@ struct RayBatch {
     }
 };
 
-/// Points of surfaces that rays leave: the members of Hit that say where such a ray starts.
+/// Surface points that rays leave: the members of Hit that define the start of such a ray.
 struct SurfacePoints {
     std::uint32_t outside = 0;  ///< a bit for each lane
     Lanes<int> body;

@@ -1,4 +1,4 @@
-/// renderer/geometry/shape.h - the surface of a body, as rays meet it.
+/// renderer/geometry/shape.h - interface of a body's surface to the ray tracer.
 ///
 /// A kind of shape is a class derived from Shape, in its own files. Only make_shapes.cpp, which makes them from the
 /// scene, names the kinds. Everything here is in the frame of the body, in metres. One virtual call serves a batch
@@ -21,7 +21,7 @@ namespace narpa {
 /// Rays in the body's frame. All lanes hold finite numbers, also those that are not traced.
 struct ShapeRays {
     Vec3Lanes origin, direction;  ///< at any distance; unit
-    Lanes<double> entry_m;        ///< where the ray enters the sphere of `bound_m`; from inside it is not above 0
+    Lanes<double> entry_m;        ///< where the ray enters the sphere of `bound_m`; at most 0 from inside
     Lanes<double> t_max;
     std::uint32_t leaving = 0;  ///< lanes whose ray starts on this shape, at a point from `depart`
     std::uint32_t inside = 0;   ///< those of them that leave its inner side
@@ -30,7 +30,7 @@ struct ShapeRays {
 
 /// The nearest hits so far. A shape writes `range_m`, `face`, `inner` and whatever else its own `surface` reads.
 struct ShapeHits {
-    std::uint32_t inner = 0;  ///< lanes that surely meet the inner side
+    std::uint32_t inner = 0;  ///< lanes known to hit the inner side
     Lanes<std::uint32_t> face;
     Lanes<double> range_m;  ///< from the ray's origin
     Vec3Lanes direction, position;
@@ -40,8 +40,8 @@ struct ShapeHits {
     [[nodiscard]] TrianglePoint point(std::size_t i) const { return {position[i], b1[i], b2[i]}; }
 };
 
-/// How the surface lies under its texture: metres along the surface per unit of u and of v. Zero where there are no
-/// texture coordinates.
+/// Derivatives of the surface position by the texture coordinates u and v, metres. Zero without texture
+/// coordinates.
 struct TextureFrame {
     Vec3 dp_du{}, dp_dv{};
 };
@@ -52,8 +52,8 @@ struct BodyBounds {
     Vec3 semi_axes_m{1, 1, 1};
 };
 
-inline constexpr std::size_t kBoxLeaves = 4096;  ///< of a shape's tree of boxes, at most
-/// Of the size of a mesh: Embree's rays are in single precision, and meet edges that they miss by so little.
+inline constexpr std::size_t kBoxLeaves = 4096;  ///< most leaves of a shape's tree of boxes
+/// Fraction of a mesh's size by which Embree's rays, in single precision, may miss an edge and still hit it.
 inline constexpr double kEmbreeSlack = 4e-6;
 
 /// A box along the body's axes.
@@ -62,8 +62,9 @@ struct BoxNode {
     std::uint32_t children = 0;  ///< index of the first of two; 0: a leaf
 };
 
-/// A body as a receiver of its light sees it. From the receiver to the body's origin it is `apart - offset`, metres
-/// in world axes; the two are never added, so that a common offset of the whole scene cancels.
+/// Position of an emissive body relative to a receiver of its light. The vector from the receiver to the body's
+/// origin is `apart - offset`, metres, world axes, stored in two parts so that a common offset of the whole scene
+/// cancels.
 struct EmitterView {
     Quat q_world_body{};
     Vec3 apart{}, offset{};
@@ -74,7 +75,7 @@ struct EmitterView {
     [[nodiscard]] Vec3 to_body(const Vec3& v) const { return conjugate(q_world_body) * v; }
 };
 
-/// The light that a shape sends out from both its sides, as next-event estimation samples it. In the body's frame.
+/// Light emitted by a shape from both its sides, for next-event estimation. In the body's frame.
 class EmissiveSurface {
 public:
     virtual ~EmissiveSurface() = default;
@@ -83,21 +84,22 @@ public:
     EmissiveSurface& operator=(const EmissiveSurface&) = delete;
 
     struct Properties {
-        Vec3 centre_m{};      ///< of a sphere that holds what shines
-        double radius_m = 0;  ///< of it
+        Vec3 centre_m{};      ///< centre of a sphere that holds the emissive surface
+        double radius_m = 0;  ///< of that sphere
         double power = 0;     ///< mean band of radiance times area, W/sr
     };
     [[nodiscard]] const Properties& properties() const noexcept { return properties_; }
 
-    /// False where sampling it is of no use: the light cannot arrive, or every ray finds it.
+    /// False where sampling is useless: the light cannot reach the receiver, or every ray hits the surface.
     [[nodiscard]] virtual bool is_worth_sampling(const EmitterView&) const noexcept { return true; }
     struct Sample {
         Vec3 direction{};        ///< world, unit, from the receiver
-        std::uint32_t face = 0;  ///< light counts only from this one
+        std::uint32_t face = 0;  ///< only light from this face counts
     };
     [[nodiscard]] virtual Sample sample(const EmitterView& view, double choice, double u,
                                         double v) const noexcept = 0;
-    /// Density per solid angle with which `sample` finds the hit of a ray from the receiver.
+    /// Density per solid angle with which `sample` generates the direction of a ray from the receiver that has this
+    /// hit.
     [[nodiscard]] virtual double pdf(const EmitterView& view, const Vec3& direction,
                                      const Hit& met) const noexcept = 0;
 
@@ -109,7 +111,7 @@ class Shape {
 public:
     struct Properties {
         double radius_m = 0;  ///< of a sphere about the body's origin that holds the shape
-        double bound_m = 0;   ///< a little more, so that rounding cannot cut off the limb
+        double bound_m = 0;   ///< slightly larger, so that rounding cannot cut off the limb
         BodyBounds bounds{};
         double resolution_m = 0;  ///< surfaces closer together than this cannot be told apart
         bool convex = false;      ///< a ray that leaves its outer side never meets it again
@@ -132,17 +134,17 @@ public:
     /// beyond, outside, texture coordinates, material. Positions and normals are still in the body's frame. Other
     /// lanes may be overwritten.
     virtual void surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept = 0;
-    /// Where rays that leave start, so that rounding cannot take them through the surface: here, the points
-    /// themselves. Other lanes of `starts` stay as they were.
+    /// Starts of rays that leave, offset so that rounding cannot move them through the surface; by default the
+    /// points themselves. Other lanes of `starts` stay as they were.
     virtual void depart(const SurfacePoints& points, std::uint32_t wanted, Vec3Lanes& starts) const noexcept {
         for_each_lane(wanted, [&](std::size_t i) { starts.put(i, points.departure_body[i]); });
     }
     /// In the body's frame.
     [[nodiscard]] virtual TextureFrame texture_frame(const Hit& hit) const noexcept = 0;
     /// A tree of boxes whose leaves hold the surface, root first; empty: the ellipsoid of `bounds` fits it best.
-    /// Made when it is first asked for, by any thread, and kept.
+    /// Built at the first call, by any thread, and cached.
     [[nodiscard]] virtual std::span<const BoxNode> boxes() const { return {}; }
-    /// Null where none of the materials shines. The scene must outlive it.
+    /// Null if no material is emissive. The scene must outlive it.
     [[nodiscard]] virtual std::unique_ptr<const EmissiveSurface> emission(const Scene&) const { return nullptr; }
 
 protected:

@@ -11,7 +11,7 @@ namespace narpa {
 struct SphereRoots {
     double near = 0, far = 0;  ///< multiples of the direction, near <= far; negative is behind the origin
 
-    [[nodiscard]] bool any() const noexcept { return near <= far; }  ///< else both are not a number
+    [[nodiscard]] bool any() const noexcept { return near <= far; }  ///< else both are NaN
 };
 
 /// The line o + t d against the sphere of this radius about the origin; d of any length but zero. The discriminant
@@ -21,7 +21,7 @@ struct SphereRoots {
 inline SphereRoots sphere_roots(const Vec3& o, const Vec3& d, double radius) noexcept {
     const double a = dot(d, d), b = -dot(o, d);
     const Vec3 closest = o + (b / a) * d;
-    const double half_chord2 = radius * radius - dot(closest, closest);  // negative: its root is not a number
+    const double half_chord2 = radius * radius - dot(closest, closest);  // negative: its root is NaN
     const double q = b + std::copysign(std::sqrt(a * half_chord2), b);
     const double far_from_zero = q / a;
     const double by_product = (dot(o, o) - radius * radius) / q;
@@ -34,8 +34,7 @@ inline SphereRoots sphere_roots(const Vec3& o, const Vec3& d, double radius) noe
 inline double bounding_entry(const Vec3& o, const Vec3& unit_d, double radius) noexcept {
     const double b = -dot(o, unit_d);
     const Vec3 closest = o + b * unit_d;
-    const double half_chord =
-        std::sqrt(radius * radius - dot(closest, closest));  // not a number where the line misses
+    const double half_chord = std::sqrt(radius * radius - dot(closest, closest));  // NaN if the line misses
     return b + half_chord >= 0 ? b - half_chord : std::numeric_limits<double>::infinity();
 }
 

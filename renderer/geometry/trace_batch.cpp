@@ -1,5 +1,5 @@
-// Batches of rays through the bodies of a scene: the bodies that they may hit, nearest first, and the surfaces
-// there.
+// Traces batches of rays through the bodies of a scene: tests the bodies that they may hit, nearest first, and
+// evaluates the surfaces at the hits.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -12,20 +12,20 @@
 
 namespace narpa {
 
-/// Rays in the world's axes. Where they start is held in two parts, as their sum would be rounded. All are finite,
-/// also those that are not traced.
+/// Rays in world axes. Their starts are stored in two parts, as the sum would be rounded. All lanes are finite,
+/// also inactive ones.
 struct WorldRays {
     bool coherent;
     const Vec3Lanes& direction;
     const Vec3Lanes& base;    ///< world: the ray's origin, or that of the body that it leaves
     const Vec3Lanes& offset;  ///< from there to the start
     const Lanes<double>& time;
-    bool one_moment;                       ///< all have the same time
+    bool same_time;                        ///< all have the same time
     const Lanes<int>* own = nullptr;       ///< the bodies that they leave; null: none
     const Vec3Lanes* own_start = nullptr;  ///< in the frame of that body
     std::uint32_t inside = 0;              ///< those that leave an inner side
 
-    /// From a body at `t`. Differences of positions come before anything else: a common offset of the whole scene
+    /// Origin relative to a body at `t`. Positions are subtracted first, so that a common offset of the whole scene
     /// cancels.
     [[nodiscard]] Vec3 origin_from(const Vec3& t, std::size_t i) const { return offset[i] + (base[i] - t); }
     [[nodiscard]] std::uint32_t that_leave(std::uint32_t body) const {
@@ -58,7 +58,7 @@ bool is_one_moment(const Lanes<double>& time) {
     return other == 0;
 }
 
-/// Lanes by body.
+/// Groups lanes by body.
 class BodyGroups {
 public:
     struct Group {
@@ -91,15 +91,15 @@ NARPA_EACH_ISA void enter(const WorldRays& rays, std::uint32_t leave, const Vec3
     }
 }
 
-/// Rays that leave the body start where it says.
-inline void start_own(const WorldRays& rays, std::uint32_t leave, ShapeRays& __restrict local) {
+/// Sets the origins of the rays that leave the body to `own_start`.
+inline void set_own_origins(const WorldRays& rays, std::uint32_t leave, ShapeRays& __restrict local) {
     if (leave == 0) return;
     const Lanes<int> own = masks_of(leave);
     for (std::size_t i = 0; i < kLanes; ++i)
         local.origin.put(i, choose(own[i] != 0, (*rays.own_start)[i], local.origin[i]));
 }
 
-/// The rays in the frame of a body.
+/// Transforms the rays to the frame of a body.
 NARPA_EACH_ISA void turn(const WorldRays& rays, std::uint32_t leave, const Rigid3& T_world_body,
                          ShapeRays& __restrict local) {
     const auto [x, y, z] = columns(T_world_body.q);  // the body's axes
@@ -108,10 +108,10 @@ NARPA_EACH_ISA void turn(const WorldRays& rays, std::uint32_t leave, const Rigid
         local.origin.put(i, {dot(x, o), dot(y, o), dot(z, o)});
         local.direction.put(i, {dot(x, d), dot(y, d), dot(z, d)});
     }
-    start_own(rays, leave, local);
+    set_own_origins(rays, leave, local);
 }
 
-/// The same two for a body that moves within the exposure, where each ray meets it at its own moment.
+/// The same two functions for a body that moves within the exposure: each ray uses the pose at its own time.
 NARPA_EACH_ISA void enter_moving(const WorldRays& rays, std::uint32_t leave, const Vec3Lanes& t, double bound_m,
                                  Lanes<double>& __restrict entry_m) {
     const Lanes<int> own = masks_of(leave);
@@ -129,12 +129,12 @@ NARPA_EACH_ISA void turn_moving(const WorldRays& rays, std::uint32_t leave, cons
         local.origin.put(i, {dot(x, o), dot(y, o), dot(z, o)});
         local.direction.put(i, {dot(x, d), dot(y, d), dot(z, d)});
     }
-    start_own(rays, leave, local);
+    set_own_origins(rays, leave, local);
 }
 
-/// Into the frame of a body, at each ray's moment.
+/// Transforms the rays to the frame of a body at each ray's time.
 void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, ShapeRays& local) {
-    if (at.moves(body) && !rays.one_moment) {
+    if (at.moves(body) && !rays.same_time) {
         PoseLanes T_world_body;
         poses_at(at, body, rays.time, T_world_body);
         turn_moving(rays, leave, T_world_body, local);
@@ -146,7 +146,7 @@ void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::
     local.coherent = rays.coherent;
 }
 
-/// Directions in the frame of a body; of lanes that are not wanted some that are finite.
+/// Transforms directions to the frame of a body; inactive lanes get arbitrary finite ones.
 NARPA_EACH_ISA void turn_directions(const Quat& q_world_body, const Vec3Lanes& directions, std::uint32_t wanted,
                                     Vec3Lanes& __restrict turned) {
     const auto [x, y, z] = columns(q_world_body);
@@ -165,10 +165,10 @@ void put_poses(const BodyPoses& at, std::size_t body, const Lanes<double>& time,
     for_each_lane(lanes, [&](std::size_t i) { T_world_body.put(i, T[i]); });
 }
 
-/// Starts in the world's axes; and directions and times, but for lanes that are not wanted some that are finite.
-NARPA_EACH_ISA void set_out(const PoseLanes& T_world_body, const SurfacePoints& from, const Vec3Lanes& start,
-                            const Vec3Lanes& directions, std::uint32_t wanted, Vec3Lanes& __restrict offset,
-                            Vec3Lanes& __restrict direction, Lanes<double>& __restrict time) {
+/// Starts, directions and times of rays in world axes; inactive lanes get arbitrary finite directions and times.
+NARPA_EACH_ISA void start_rays(const PoseLanes& T_world_body, const SurfacePoints& from, const Vec3Lanes& start,
+                               const Vec3Lanes& directions, std::uint32_t wanted, Vec3Lanes& __restrict offset,
+                               Vec3Lanes& __restrict direction, Lanes<double>& __restrict time) {
     const Lanes<int> mine = masks_of(wanted);
     for (std::size_t i = 0; i < kLanes; ++i) {
         offset.put(i, T_world_body[i].q * start[i]);
@@ -183,7 +183,8 @@ std::uint32_t lanes_before(const Lanes<double>& entry_m, const Lanes<double>& en
     return bits_of(before);
 }
 
-/// From the body's frame to the world's. By a pose that is a copy, as the stores might change one in memory.
+/// Transforms surfaces from the body's frame to the world. The pose is copied, as for the compiler the stores might
+/// change it.
 NARPA_EACH_ISA void to_world(const Rigid3& T_world_body, HitBatch& __restrict hits) {
     const Rigid3 T = T_world_body;
     for (std::size_t i = 0; i < kLanes; ++i) hits.position.put(i, T * hits.position[i]);
@@ -213,21 +214,22 @@ void copy_surfaces(const HitBatch& from, std::uint32_t lanes, HitBatch& to) {
 
 }  // namespace
 
-/// Rays that leave surfaces. Each starts in the frame of its own body, which knows no distances but its own.
-class Tracer::Impl::LeavingRays {
+/// Rays that leave surfaces. Each start is computed in the frame of its own body, where coordinates, and so
+/// rounding errors, are small.
+class Tracer::Impl::SecondaryRays {
 public:
-    LeavingRays(const Impl& impl, const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
-                std::uint32_t wanted) noexcept
+    SecondaryRays(const Impl& impl, const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
+                  std::uint32_t wanted) noexcept
         : impl_(impl), at_(at), from_(from), directions_(directions), wanted_(wanted), groups_(from.body, wanted) {
         for (const auto& [body, mine] : groups_) impl.shapes[body]->depart(from, mine, start_);
     }
 
-    /// The body that all of them leave, if it is still; else as many as there are bodies.
+    /// The body that all rays leave, if it does not move; else the number of bodies.
     [[nodiscard]] std::size_t body_of_all() const noexcept {
         const auto& [body, mine] = *groups_.begin();
         return mine == wanted_ && !at_.moves(body) ? body : impl_.shapes.size();
     }
-    /// The lanes that meet this body, of all, before `t_max`: the world's axes are not needed.
+    /// The lanes that hit this body, which all rays leave, before `t_max`: world axes are not needed.
     [[nodiscard]] std::uint32_t occluded_by(std::size_t body, const Lanes<double>& t_max,
                                             bool coherent) const noexcept {
         ShapeRays local;
@@ -250,7 +252,7 @@ public:
             own_at_ = {};
             for (const auto& [body, mine] : groups_) put_poses(at_, body, from_.time, mine, own_at_);
         }
-        set_out(own_at_, from_, start_, directions_, wanted_, offset_, direction_, time_);
+        start_rays(own_at_, from_, start_, directions_, wanted_, offset_, direction_, time_);
         return {coherent, direction_, own_at_.t,
                 offset_,  time_,      is_one_moment(time_),
                 &own_,    &start_,    wanted_ & ~from_.outside};
@@ -287,7 +289,7 @@ void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::u
                               Lanes<double>& entry_m) const noexcept {
     const std::uint32_t leave = rays.that_leave(body);
     const double bound_m = shapes[body]->properties().bound_m;
-    if (at.moves(body) && !rays.one_moment) {
+    if (at.moves(body) && !rays.same_time) {
         Vec3Lanes t;
         positions_at(at, body, rays.time, t);
         enter_moving(rays, leave, t, bound_m, entry_m);
@@ -317,7 +319,7 @@ NARPA_EACH_ISA void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldR
     std::array<Candidate, kSortedBodies> candidates;
     std::array<std::size_t, kSortedBodies> order;
     while (!bodies.empty()) {
-        // Bounds about the bodies' origins first, nearest body first.
+        // Sort the bodies whose bounding spheres are hit by distance, then trace the nearest first.
         std::size_t m = 0;
         for (; !bodies.empty() && m < kSortedBodies; bodies = bodies.subspan(1)) {
             Candidate& c = candidates[m];
@@ -344,7 +346,7 @@ NARPA_EACH_ISA void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldR
 NARPA_EACH_ISA std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, const SurfacePoints& from,
                                                          const Vec3Lanes& directions, const Lanes<double>& t_max,
                                                          std::uint32_t wanted, bool coherent) const noexcept {
-    LeavingRays leaving(*this, at, from, directions, wanted);
+    SecondaryRays leaving(*this, at, from, directions, wanted);
     const std::size_t own = leaving.body_of_all();
     const bool is_one = own < shapes.size();
     std::uint32_t dark = is_one ? leaving.occluded_by(own, t_max, coherent) : 0;
@@ -377,7 +379,7 @@ NARPA_EACH_ISA void Tracer::Impl::finish(const BodyPoses& at, const WorldRays& r
     const auto& [first, firsts] = *groups.begin();
     shapes[first]->surface(nearest.at, firsts, hits);
     hits.outside &= nearest.met;
-    if (firsts == nearest.met && (rays.one_moment || !at.moves(first)))
+    if (firsts == nearest.met && (rays.same_time || !at.moves(first)))
         return to_world(at.T_world_body_at(first, rays.time[0]), hits);
 
     PoseLanes T_world_body;
@@ -409,7 +411,7 @@ void Tracer::intersect(const BodyPoses& at, const RayBatch& rays, std::span<cons
 void Tracer::intersect(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                        std::uint32_t wanted, HitBatch& hits) const noexcept {
     if (wanted == 0) return hits.clear();
-    Impl::LeavingRays leaving(*impl_, at, from, directions, wanted);
+    Impl::SecondaryRays leaving(*impl_, at, from, directions, wanted);
     const WorldRays rays = leaving.in_world(false);
     NearestHits nearest;
     impl_->find_nearest(at, rays, wanted, impl_->all_bodies, nearest);

@@ -1,8 +1,8 @@
-/// renderer/geometry/tracer.h - rays into a scene.
+/// renderer/geometry/tracer.h - traces rays through a scene.
 ///
-/// Each body's shape stands in its own frame and is built once. A ray enters that frame in double, its origin
-/// advanced to the body's bounding sphere, and its range stays double: 0.3 um at any distance, where Embree's own
-/// instances (float) lose 0.2 m at 6778 km. Bodies move by other BodyPoses; nothing is ever rebuilt.
+/// Each body's shape is built once, in its own frame. A ray is transformed to that frame in double, its origin
+/// advanced to the body's bounding sphere, and its range stays double: an error of 0.3 um at any distance, where
+/// Embree's own instances (float) are off by 0.2 m at 6778 km. Bodies move by other BodyPoses; nothing is rebuilt.
 ///
 /// All queries are thread-safe and allocate nothing.
 #pragma once
@@ -21,8 +21,8 @@ namespace narpa {
 
 class Tracer {
 public:
-    /// `scene` must outlive the tracer. `threads` bounds the threads that build; 0 is all. `shapes[i]`, where it is
-    /// there and not null, is the shape of body i in place of Body::shape: for kinds that scene files do not name.
+    /// `scene` must outlive the tracer. `threads` bounds the threads that build; 0 is all. `shapes[i]`, if present
+    /// and not null, replaces Body::shape of body i: for kinds that scene files do not have.
     static Result<Tracer> create(const Scene& scene, int threads = 0,
                                  const std::vector<std::shared_ptr<const Shape>>& shapes = {});
     template <class... Rest>
@@ -37,18 +37,18 @@ public:
                    HitBatch& hits) const noexcept;
     /// Nearest hits of rays that leave surfaces, each from its point on the side of its geometric normal, in any
     /// unit direction, at the moment of its point. Only lanes whose bit is set in `wanted` are traced, and only
-    /// those of `hits` have defined values. The start is lifted by the bound of the rounding error in that body's
-    /// own frame, and kept as far from the edges of its face as a few times that, so that a surface never shadows
-    /// itself and nothing further off is skipped; ranges count from there. A direction below the horizon of its own
-    /// surface meets that surface at once. Rays that leave the inner side of a closed mesh or an ellipsoid meet it
-    /// again from inside. `hits` may be `from`.
+    /// those of `hits` have defined values. The start is offset along the normal by the bound of the rounding error
+    /// in that body's own frame, and kept a few times that far from the edges of its face, so that a surface never
+    /// shadows itself and nothing farther off is skipped; ranges are measured from there. A direction below the
+    /// horizon of its own surface meets that surface at once. Rays that leave the inner side of a closed mesh or an
+    /// ellipsoid meet it again from inside. `hits` may be `from`.
     void intersect(const BodyPoses& at, const SurfacePoints& from, const Vec3Lanes& directions,
                    std::uint32_t wanted, HitBatch& hits) const noexcept;
-    /// Shadow rays without an end: the lanes of `wanted` whose ray, which leaves as above, meets any surface.
-    /// Fastest where the directions are nearly the same, as to the Sun.
+    /// Shadow rays of infinite length: the lanes of `wanted` whose ray, which starts as above, hits any surface.
+    /// Fastest if the directions are nearly equal, as to the Sun.
     [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, const SurfacePoints& from,
                                          const Vec3Lanes& directions, std::uint32_t wanted) const noexcept;
-    /// Shadow rays with ends: t_max[i] metres from the start.
+    /// Shadow rays of finite length: t_max[i] metres from the start.
     [[nodiscard]] std::uint32_t occluded(const BodyPoses& at, const SurfacePoints& from,
                                          const Vec3Lanes& directions, const Lanes<double>& t_max,
                                          std::uint32_t wanted) const noexcept;
@@ -72,7 +72,7 @@ public:
     [[nodiscard]] double bounding_radius_m(std::size_t body) const noexcept {
         return shape(body).properties().radius_m;
     }
-    /// 0, 1, 2 ...: for rays that may hit any body.
+    /// The indices of all bodies: for rays that may hit any body.
     [[nodiscard]] std::span<const std::uint32_t> all_bodies() const noexcept;
     [[nodiscard]] std::size_t triangle_count() const noexcept;
     [[nodiscard]] const Scene& scene() const noexcept;

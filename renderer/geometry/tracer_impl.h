@@ -11,8 +11,8 @@ namespace narpa {
 /// One for each body; bodies with the same mesh share theirs.
 using Shapes = std::vector<std::shared_ptr<const Shape>>;
 
-/// `given` stands for the first bodies, where it is not null, in place of what the scene says. The scene must
-/// outlive the shapes. `threads` bounds the threads that build; 0 is all.
+/// Entries of `given` that are not null replace the scene's shapes of the first bodies. The scene must outlive the
+/// shapes. `threads` bounds the threads that build; 0 is all.
 [[nodiscard]] Result<Shapes> make_shapes(const Scene& scene, const Shapes& given, RTCDevice device, int threads);
 
 struct WorldRays;
@@ -26,7 +26,7 @@ struct Tracer::Impl {
 
     Status build(const Scene& s, int threads, const Shapes& given);
 
-    class LeavingRays;
+    class SecondaryRays;
     /// Nearest hits of the `wanted` lanes among these bodies.
     void find_nearest(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted,
                       std::span<const std::uint32_t> bodies, NearestHits& nearest) const noexcept;

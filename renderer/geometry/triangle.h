@@ -1,7 +1,6 @@
-/// renderer/geometry/triangle.h - a ray and a triangle, in double, in the frame of their body.
+/// renderer/geometry/triangle.h - ray-triangle intersection in double, in the frame of the body.
 ///
-/// Without branches: loops over the rays of a packet call these for each, and the compiler works on several rays at
-/// once.
+/// Branch-free, so that the compiler vectorises loops over the rays of a packet.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +15,7 @@ namespace narpa {
 struct Triangle {
     Vec3 a, b, c;
 
-    /// By the winding, twice the area long.
+    /// Normal by the winding; its length is twice the area.
     [[nodiscard]] Vec3 normal() const noexcept { return cross(b - a, c - a); }
 };
 
@@ -33,10 +32,9 @@ struct TrianglePoint {
     double b1 = 0, b2 = 0;  ///< barycentric weights of b and c
 };
 
-/// Where a ray that is known to hit the triangle hits it (T. Moller, B. Trumbore, "Fast, minimum storage
-/// ray-triangle intersection", Journal of Graphics Tools 2(1), 1997), kept inside the triangle so that a hit on an
-/// edge stays on the surface. Where that has no solution, as for a needle seen from its end, the weights are u and
-/// v.
+/// The hit of a ray that is known to hit the triangle (T. Moller, B. Trumbore, "Fast, minimum storage ray-triangle
+/// intersection", Journal of Graphics Tools 2(1), 1997), clamped to the triangle so that a hit on an edge stays on
+/// the surface. Where the equations are singular, as for a sliver seen end on, the weights are u and v.
 [[nodiscard]] inline TrianglePoint hit_point(const Triangle& t, const Vec3& start, const Vec3& direction, double u,
                                              double v) noexcept {
     const Vec3 e1 = t.b - t.a, e2 = t.c - t.a;
@@ -54,11 +52,11 @@ struct TrianglePoint {
 /// The surface about a point of a triangle.
 struct TriangleSurface {
     Vec3 outwards{};        ///< unit, by the winding
-    Vec3 smooth{};          ///< unit, as the vertex normals have it, on the same side
+    Vec3 smooth{};          ///< unit, interpolated from the vertex normals, on the same side
     Vec3 above{}, below{};  ///< where rays leave on the outer and on the inner side
 };
 
-/// Of a mesh without vertex normals. `otherwise` is outwards where the triangle has no area.
+/// The surface of a mesh without vertex normals. `otherwise`: the normal of a triangle without area.
 [[nodiscard]] inline TriangleSurface flat_surface(const Triangle& t, const Vec3& position,
                                                   const Vec3& otherwise) noexcept {
     const Vec3 normal = t.normal();
@@ -93,16 +91,16 @@ struct TriangleSurface {
     return s;
 }
 
-/// Where a ray starts that leaves a triangle, and whether that is far enough from its edges.
+/// Offset of a ray that leaves a triangle, and whether its start is far enough from the edges.
 struct Departure {
     Vec3 normal{};           ///< unit; zero where the triangle has no area
-    double lift_m = 0;       ///< along the normal, as much as rounding in single precision can lower it
-    double clearance_m = 0;  ///< from the edges, so that the lift does not take it through a neighbour at an angle
-                             ///< of 7 degrees or more
-    bool near_edge = false;  ///< perhaps nearer than that, or without an area
+    double lift_m = 0;       ///< along the normal: the bound of the rounding error in single precision
+    double clearance_m = 0;  ///< distance from the edges at which the lift does not cross a neighbouring face that
+                             ///< meets at 7 degrees or more
+    bool near_edge = false;  ///< possibly nearer than that, or without an area
 };
 
-/// From `position`, which is `from_origin` away from where Embree has its origin.
+/// Departure from `position`. `from_origin`: the same point relative to Embree's origin.
 [[nodiscard]] inline Departure departure_from(const Triangle& t, const Vec3& position,
                                               const Vec3& from_origin) noexcept {
     constexpr double kHalfUlp = 0x1p-24;  // largest relative rounding error of single precision
@@ -128,8 +126,8 @@ struct Departure {
     return d;
 }
 
-/// A point of the triangle, moved towards the middle of the circle that touches its edges until it is as far from
-/// each as `clearance_m`, by at most eight times that.
+/// Moves a point of the triangle towards the incentre until it is `clearance_m` away from each edge, by at most
+/// eight times that.
 [[nodiscard]] inline Vec3 away_from_edges(const Triangle& t, const Vec3& p, const Departure& d) noexcept {
     if (d.normal == Vec3{}) return p;
     const std::array<Vec3, 3> corner{t.a, t.b, t.c}, edge{t.b - t.a, t.c - t.b, t.a - t.c};

@@ -130,7 +130,7 @@ Status write_exr(const std::string& path, const RenderedFrame& frame) {
     return Ok{};
 }
 
-/// As the camera puts it out.
+/// The camera's output as PNG.
 Status write_png(const std::string& path, const RenderedFrame& frame) {
     // cv::Mat has no const view; OpenCV only reads it.
     const auto view = [&](int type) {

@@ -40,10 +40,10 @@ Status check_image_name(const std::string& path);
 /// Errors: an unknown extension; a path that cannot be written.
 Status write_image(const std::string& path, const RenderedFrame& frame);
 
-/// A frame as the camera puts it out, byte for byte: from .raw, or from another image (PNG, TIFF, PGM ...) that has
-/// the camera's size and the channels and bits of its format, as write_image makes it: numbers of 9 to 15 bits in
-/// the upper bits of 16. Errors: a file that cannot be read; another size or other pixels than the camera's; YUYV,
-/// whose bytes an image does not have.
+/// Reads a frame as the camera outputs it, byte for byte: from .raw, or from another image (PNG, TIFF, PGM ...)
+/// with the camera's size and the channels and bits of its format, as write_image writes it: samples of 9 to 15
+/// bits in the upper bits of 16. Errors: a file that cannot be read; a size or pixel type that is not the camera's;
+/// YUYV, whose bytes an image file does not hold.
 Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera);
 
 /// Writes one 32-bit float a pixel as a grey PFM, little-endian, rows from the bottom. `values`: row by row from

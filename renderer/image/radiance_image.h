@@ -25,9 +25,9 @@ struct Aovs {
     std::vector<Vec3> position, normal;    ///< world
     std::vector<std::int32_t> body;
     std::vector<Rgb> albedo;  ///< base colour with its texture: a mirror's reflectance, white for glass
-    /// Of the pixel's mean over the bands, W^2 m^-4 sr^-2 (0 for spp < 2, except for subpixel bodies):
-    /// pixel_samples.h describes the estimate and its 95 % interval, frame_error.h what stratification gains.
-    /// With a budget: the expected variance of refined frames, else 0.
+    /// Variance of the pixel's mean over the bands, W^2 m^-4 sr^-2 (0 for spp < 2, except for subpixel bodies):
+    /// pixel_samples.h describes the estimate and its 95 % interval, frame_error.h the gain of stratification. With
+    /// a budget: the expected variance of refined frames, else 0.
     std::vector<float> variance;
 };
 

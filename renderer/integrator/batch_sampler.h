@@ -1,5 +1,4 @@
-/// renderer/integrator/batch_sampler.h - PixelSampler::point for sixteen samples at once: the same numbers, bit for
-/// bit.
+/// renderer/integrator/batch_sampler.h - PixelSampler::point for sixteen samples at once, bit-identical.
 #pragma once
 
 #include "base/lanes.h"
@@ -11,7 +10,8 @@ class BatchSampler {
 public:
     using Points = std::array<Lanes<double>, 4>;
 
-    /// Of each of the first n lanes: the number of its pixel, and of the sample in that pixel's sequence.
+    /// `pixel`, `sample`: for each of the first n lanes, the number of its pixel and the sample's index in that
+    /// pixel's sequence.
     BatchSampler(std::uint64_t seed, std::uint32_t frame, std::size_t n, const Lanes<std::uint32_t>& pixel,
                  const Lanes<std::uint32_t>& sample) noexcept
         : n_(n), sample_(sample) {
@@ -23,7 +23,7 @@ public:
     }
     /// The first four dimensions.
     void points(Points& u) const noexcept { scrambled(sample_, key_, u); }
-    /// Another four; group > 0.
+    /// Four further dimensions; group > 0.
     void points(std::uint32_t group, Points& u) const noexcept {
         using namespace sampler_detail;
         Lanes<std::uint64_t> a;

@@ -6,8 +6,8 @@
 namespace narpa {
 namespace {
 
-/// PathSettings::first_survival where edges make most of the error: in frames of one sample a pixel, and where
-/// paths are traced from all samples.
+/// PathSettings::first_survival if edges cause most of the error: in frames of one sample per pixel, and if paths
+/// are traced from all samples.
 constexpr float kReducedSurvival = 0.5f;
 
 const SunDirectLighting kSunDirectLighting;
@@ -21,12 +21,12 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const Tracer& tracer = render_scene.tracer();
     const Scene& scene = render_scene.scene();
     const bool direct = settings.method == RenderSettings::Method::direct;
-    // One sample passes the lens at its centre, as through a pinhole.
+    // A single sample passes the lens at its centre, as through a pinhole.
     const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
     const Lens* const lens = blurred ? &*camera.lens : nullptr;
     const Mechanisms& on = settings.mechanisms;
     const bool over_time = pose.over_time() && (pose.moves() || at.moving());
-    // Paths of different moments see moving bodies at different places.
+    // Paths at different times see moving bodies at different places.
     const bool reuse = on.path_reuse && !(over_time && at.moving());
     const bool small_bodies = !direct && on.small_body_sampling && SmallBodySampling::may_help(tracer, at);
     const bool sun_only = direct && SunDirectLighting::suffices(render_scene);

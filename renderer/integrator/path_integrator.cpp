@@ -9,11 +9,11 @@
 namespace narpa {
 namespace {
 
-/// Batches whose paths go together.
+/// Batches whose paths are traced together.
 constexpr std::size_t kTogether = 8;
 
-/// Each ray by itself, of up to kTogether batches: of the lanes that `lanes` gives for a batch. `put(batch, lane,
-/// radiance)` takes the results.
+/// Traces each ray on its own, for up to kTogether batches and the lanes that `lanes` gives for a batch.
+/// `put(batch, lane, radiance)` takes the results.
 template <class LanesOf, class Put>
 void trace_paths(const Frame& f, std::span<CameraBatch> batches, LanesOf&& lanes, Put&& put) {
     PhaseClock clock(batches.front().times);
@@ -24,7 +24,7 @@ void trace_paths(const Frame& f, std::span<CameraBatch> batches, LanesOf&& lanes
     std::size_t n = 0;
     for (const CameraBatch& p : batches)
         for_each_lane(lanes(p), [&](std::size_t i) {
-            // In place: a copy of what was just written by parts would wait for it.
+            // Constructed in place: a copy would stall on store forwarding from the partial writes.
             new (&rays[n]) Ray(p.rays[i]);
             new (&hits[n]) Hit(p.hits[i]);
             number[n] = p.number[i], sample[n++] = p.sample[i];
@@ -39,12 +39,12 @@ void trace_paths(const Frame& f, std::span<CameraBatch> batches, LanesOf&& lanes
     clock.ends(Phase::indirect);
 }
 
-/// A sample of a pixel.
+/// Position of a sample in the batches.
 struct SamplePlace {
     std::uint8_t batch, lane;
 };
 
-/// One sample of each of some pixels, with path reuse.
+/// Traces one sample of each of some pixels, with path reuse.
 void trace_reused(const Frame& f, std::span<CameraBatch> batches, std::span<const SamplePlace> places,
                   std::span<BatchRadiance> light) {
     std::array<SamplePlace, kReuseGroup> from;
@@ -52,7 +52,7 @@ void trace_reused(const Frame& f, std::span<CameraBatch> batches, std::span<cons
     std::array<Rgb, kReuseGroup> radiance;
     std::array<float, kReuseGroup> variance;
     std::size_t n = 0;
-    // As on a chessboard, first one colour, then the other: those of a group lie between those of another.
+    // In checkerboard order, so that the pixels of one reuse group lie between those of another.
     for (std::size_t colour = 0; colour < 2; ++colour)
         for (std::size_t i = 0; i < places.size(); ++i) {
             if (((i ^ i >> 2) & 1) != colour) continue;
@@ -111,7 +111,7 @@ void PathIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
     }
     if (batches.empty()) return;
     PhaseClock clock(batches.front().times);
-    // One sample of each pixel together, then the next of each: those of a pixel stay independent.
+    // One sample of each pixel together, then the next of each, so that the samples of a pixel stay independent.
     std::array<std::array<SamplePlace, kReuseGroup>, kMaxPixelSamples> places;
     std::array<std::size_t, kMaxPixelSamples> n{};
     std::size_t rank = 0;

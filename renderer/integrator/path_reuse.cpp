@@ -9,14 +9,15 @@
 namespace narpa {
 namespace {
 
-/// Rounding relative to the distance.
+/// Rounding error relative to the distance.
 constexpr double kTouchingFarOff = 1e-15;
-/// Second vertices that are joined, on average; of more the brightest are likeliest.
+/// Mean number of second vertices that are connected; if there are more, brighter ones are more likely.
 constexpr double kJoined = 16;
-/// First vertices among which paths are reused, in blocks of sixteen. For distant light, which is alike for all,
-/// more are better; for near light, and for the cost of shadow rays, fewer.
+/// Number of first vertices that share paths, in blocks of sixteen. Distant light, alike for all, favours more;
+/// near light and the cost of shadow rays favour fewer.
 constexpr std::size_t kBlocksOfAGroup = 2;
-/// Least cosine by which `touching_m` is divided: a grazing ray passes more of it.
+/// Smallest cosine by which `touching_m` is divided; it is divided because a grazing ray passes more of that
+/// distance.
 constexpr double kGrazing = 1e-3;
 constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
 
@@ -29,7 +30,7 @@ SecondVertex::SecondVertex(const Tracer& tracer, const PathVertex& a_vertex, con
 }
 
 bool SecondVertex::is_reusable(const PathVertex& p) noexcept {
-    // A lobe alone reflects along its mirror direction, which is another for each receiver.
+    // A surface with only a lobe reflects along its mirror direction, which differs for each receiver.
     const Material::Kind kind = p.surface().material->kind;
     return (kind == Material::Kind::lambert || kind == Material::Kind::phong) && !p.bent() &&
            max_component(p.surface().diffuse) > 0;
@@ -101,7 +102,7 @@ int FirstVertices::add_to(Block& b, const Path& path, float survival, const Path
     return static_cast<int>(n_++);
 }
 
-/// Of those whose direct light is known and that have a lobe, or sample small bodies.
+/// Makes the vertices of special lanes whose direct light is known.
 void FirstVertices::make_vertices(const Tracer& tracer, const BodyPoses& at, double pixel_angle_rad) noexcept {
     for (std::size_t k = 0; k < n_; ++k) {
         if (lit_[k] == nullptr || !is_set(block_[k / kLanes].special, k % kLanes)) continue;
@@ -133,7 +134,7 @@ NARPA_EACH_ISA void FirstVertices::join(const Block& b, const SecondVertex& seco
     j.lit = bits_of(faces);
 }
 
-/// Lanes of a block from which the second vertex is visible. Returns the number of rays.
+/// Finds the lanes of a block from which the second vertex is visible. Returns the number of rays.
 std::uint64_t FirstVertices::join_visible(const Tracer& tracer, const BodyPoses& at, std::size_t block,
                                           const SecondVertex& second, Join& j) const noexcept {
     const Block& b = block_[block];
@@ -219,7 +220,7 @@ std::uint64_t FirstVertices::gather(const Tracer& tracer, const BodyPoses& at, s
         if (passed >= 1) passed -= 1;
         rays += gather(tracer, at, second[i], static_cast<float>(1 / chance), radiance);
     }
-    // The scatter of what the surviving paths found, most of them nothing, is that of the sum.
+    // The scatter of the surviving paths' contributions, most of them zero, gives the variance of the sum.
     double survivors = 0;
     for (std::size_t k = 0; k < n_; ++k) survivors += static_cast<double>(block_[k / kLanes].survival[k % kLanes]);
     const auto n = static_cast<float>(std::max(survivors, 2.0));

@@ -1,11 +1,12 @@
-/// renderer/integrator/path_reuse.h - light found by one path lights the first vertices of its neighbours as well.
+/// renderer/integrator/path_reuse.h - path reuse: light found by one path also illuminates the first vertices of
+/// its neighbours.
 ///
-/// Most rays that leave a spacecraft's surfaces escape, and the few that meet a sunlit part of it bring all that
-/// its other parts send. So the second vertices of paths are joined by shadow rays to thirty-two first vertices,
-/// their own among them, and each stands for all of these: multiple importance sampling by the balance heuristic
-/// over the first vertices that could have found it (P. Bekaert, M. Sbert, J. Halton, "Accelerating path tracing by
-/// re-using paths", EGWR 2002). Unbiased, as visibility is known for every pair. A second vertex never weighs more
-/// in its own path than the albedo, so corners send no fireflies.
+/// Most rays that leave a spacecraft's surfaces escape, and the few that hit a sunlit part carry all of its
+/// indirect light. So shadow rays connect the second vertices of paths to thirty-two first vertices, their own
+/// included, and each second vertex is weighted for all of these: multiple importance sampling by the balance
+/// heuristic over the first vertices that could have found it (P. Bekaert, M. Sbert, J. Halton, "Accelerating path
+/// tracing by re-using paths", EGWR 2002). Unbiased, because visibility is known for every pair. A second vertex
+/// never weighs more in its own path than the albedo, so corners cause no fireflies.
 #pragma once
 
 #include <array>
@@ -19,11 +20,11 @@
 
 namespace narpa {
 
-/// The second vertex of a path, and the light that falls in on it.
+/// The second vertex of a path, and the light incident on it.
 struct SecondVertex {
     struct Incident {
         Vec3 from{};  ///< unit
-        Rgb light{};  ///< irradiance on a surface that faces it, W m^-2, or radiance by density
+        Rgb light{};  ///< irradiance on a surface that faces it, W m^-2, or radiance / density
     };
     enum : std::size_t { sun, emitter, background, path, kIncidents };
 
@@ -31,14 +32,14 @@ struct SecondVertex {
 
     PathVertex vertex;
     Vec3 position;           ///< world
-    double touching_m;       ///< closer surfaces are the same to rounding
-    std::size_t found_from;  ///< number of its path's first vertex
+    double touching_m;       ///< distance below which surfaces coincide within rounding
+    std::size_t found_from;  ///< index of its path's first vertex
     std::array<Incident, kIncidents> incident{};
 
     /// True for BSDFs that scatter over the whole hemisphere.
     [[nodiscard]] static bool is_reusable(const PathVertex& vertex) noexcept;
-    /// Lets a path go on in the direction s: what it finds then falls in here. `inverse_survival`: 1 / probability
-    /// with which it survived. False: the direction has no density.
+    /// Continues a path in the direction of `s`; the light that it finds is then incident here. `inverse_survival`:
+    /// 1 / survival probability. False: the direction has no density.
     [[nodiscard]] bool leave(Path& path, const BsdfSample& s, float inverse_survival) noexcept;
     /// Radiance towards a unit direction on its side.
     [[nodiscard]] Rgb radiance(const Vec3& direction) const noexcept;
@@ -48,16 +49,16 @@ struct SecondVertex {
 class FirstVertices {
 public:
     void clear() noexcept { n_ = 0; }
-    /// One whose direct light is known. `path`: its ray, to whose radiance it adds, and its small bodies;
-    /// `survival`: probability with which the path leaves it. Returns its number.
+    /// Adds a vertex whose direct light is known. `path`: gives the ray to whose radiance it adds, and the small
+    /// bodies; `survival`: probability that the path leaves the vertex. Returns its index.
     int add(const BodyPoses& at, const PathStart& start, const Path& path, float survival) noexcept;
-    /// Any other.
+    /// Adds any other vertex.
     int add(const BodyPoses& at, const Hit& hit, const PathVertex& vertex, const Path& path,
             float survival) noexcept;
 
-    /// Adds to each first vertex's radiance what it receives from the second vertices of its thirty-two. `choice`:
-    /// in [0, 1), chooses some of the second vertices where there are many. `variance`: out, estimated for the mean
-    /// band of what was added. Returns the number of rays.
+    /// Adds to each first vertex's radiance the light that it receives from the second vertices of its group of
+    /// thirty-two. `choice`: in [0, 1), selects some of the second vertices if there are many. `variance`: out,
+    /// estimated for the mean band of the added light. Returns the number of rays.
     std::uint64_t gather(const Tracer& tracer, const BodyPoses& at, std::span<SecondVertex> second, double choice,
                          double pixel_angle_rad, std::span<Rgb> radiance, std::span<float> variance) noexcept;
 
@@ -70,7 +71,7 @@ private:
         RgbLanes diffuse;  ///< over pi
         Lanes<float> survival;
     };
-    /// A second vertex joined to a block.
+    /// Connections of a second vertex to the lanes of a block.
     struct Join {
         Vec3Lanes direction;
         Lanes<double> range_m, density, geometry;
@@ -92,7 +93,7 @@ private:
     std::array<Block, kReuseGroup / kLanes> block_;
     std::array<std::uint32_t, kReuseGroup> ray_;
     std::array<float, kReuseGroup> sum_, squares_;          ///< of the mean bands received
-    std::array<const PathStart*, kReuseGroup> lit_;         ///< null: the others
+    std::array<const PathStart*, kReuseGroup> lit_;         ///< null: vertices whose direct light is not known
     UninitializedArray<PathVertex, kReuseGroup> vertices_;  ///< of special lanes
     UninitializedArray<Path, kReuseGroup> paths_;           ///< of lanes that sample small bodies
 };

@@ -12,23 +12,23 @@
 
 namespace narpa {
 
-/// A vertex: the surface that a path meets, and its BSDF there.
+/// A path vertex: the surface at the hit and its BSDF.
 ///
-/// Light falls in from one side of a plane: that of the face, or of the smooth surface that vertex normals describe
-/// where rays leave from that surface (Hit::departure_body).
+/// Light is incident from one side of a plane: that of the face or, where rays leave from the smooth surface that
+/// vertex normals describe (Hit::departure_body), that of the smooth surface.
 ///
-/// A normal of any other direction - from a map, or of vertices about a hollow - gives part of the BSDF to
-/// directions behind the plane, from where no light can come: dark seams, and energy lost. That part is folded back
-/// here, to the mirror image of each direction in the plane. Mirroring keeps solid angles, so what the surface
-/// reflects in all is exactly what its material reflects about its normal, and a white surface in an even light
-/// stays white whatever its normals are. (Its kin: the upright mirror that sends on what a tilted facet would lose
-/// in V. Schuessler, E. Heitz, J. Hanika, C. Dachsbacher, "Microfacet-based normal mapping for robust Monte Carlo
-/// path tracing", ACM TOG 36(6), 2017.)
+/// A normal of any other direction - from a normal map, or from vertex normals in a concave region - gives part of
+/// the BSDF to directions behind the plane, from where no light can come: dark seams and lost energy. Here that
+/// part is reflected to the mirror image of each direction in the plane. Mirroring preserves solid angles, so the
+/// total reflectance is exactly the material's about its normal, and a white surface in uniform light stays white
+/// whatever its normals are. (Related: the vertical mirror facet that reflects what a tilted facet would lose in V.
+/// Schuessler, E. Heitz, J. Hanika, C. Dachsbacher, "Microfacet-based normal mapping for robust Monte Carlo path
+/// tracing", ACM TOG 36(6), 2017.)
 class PathVertex {
 public:
     PathVertex() = default;
-    /// Seen along a unit direction with a beam of this width (see surface_at). Unless `fold`, light counts as it
-    /// does in direct lighting: by the surface's normal alone.
+    /// Seen along a unit direction with a footprint of this width (see surface_at). Without `fold`, only the
+    /// surface's normal counts, as in direct lighting.
     PathVertex(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction, double width_m,
                bool fold) noexcept
         : surface_(surface_at(tracer, at, hit, ray_direction, width_m)),
@@ -40,33 +40,33 @@ public:
             const Vec3 flat = at.T_world_body_at(static_cast<std::size_t>(hit.body), hit.time) * hit.departure_body;
             if (flat != hit.position) plane_ = hit.shading_normal;
         }
-        // Vertex normals that face away from the viewer are of no use.
+        // Vertex normals that face away from the viewer cannot be used.
         if (dot(surface_.normal, view_) <= 0) surface_.normal = hit.geometric_normal;
         bent_ = surface_.normal != plane_;
         plain_ = !bent_ && surface_.material->kind == Material::Kind::lambert && dot(plane_, view_) > 0;
     }
 
     [[nodiscard]] const Surface& surface() const noexcept { return surface_; }
-    /// Normal of the plane, unit, on the viewer's side but for silhouettes of smooth meshes.
+    /// Normal of the plane, unit, on the viewer's side except at silhouettes of smooth meshes.
     [[nodiscard]] const Vec3& plane() const noexcept { return plane_; }
 
     /// Unit, towards the viewer.
     [[nodiscard]] const Vec3& view() const noexcept { return view_; }
-    /// True where the surface's normal is not the plane's.
+    /// True if the surface's normal is not the plane's.
     [[nodiscard]] bool bent() const noexcept { return bent_; }
-    /// Lambert's law about the plane's normal: most vertices of most scenes.
+    /// True for Lambert's law about the plane's normal, the most common case.
     [[nodiscard]] bool plain() const noexcept { return plain_; }
 
-    /// True where the BSDF is a delta distribution (bsdf.h).
+    /// True if the BSDF is a delta distribution (bsdf.h).
     [[nodiscard]] bool specular() const noexcept { return is_specular(*surface_.material); }
-    /// True for Lambert's law alone, about whatever normal.
+    /// True for Lambert's law alone, about any normal.
     [[nodiscard]] bool has_no_lobe() const noexcept {
         return surface_.material->kind <= Material::Kind::phong && surface_.specular == Rgb{};
     }
 
     struct Response {
         Rgb f_cos{};     ///< BSDF times the cosine of the incidence, 1/sr
-        double pdf = 0;  ///< density per solid angle with which `scatter` finds the direction
+        double pdf = 0;  ///< density per solid angle with which `scatter` chooses the direction
     };
     /// For light from the unit direction l.
     [[nodiscard]] Response respond(const Vec3& l) const noexcept {
@@ -79,7 +79,7 @@ public:
         return {straight.f_cos + image.f_cos, straight.pdf + image.pdf};
     }
 
-    /// BSDF sampling of the next direction. The density is infinite where nothing else could find it.
+    /// BSDF sampling of the next direction. The density is infinite if no other technique can find it.
     [[nodiscard]] BsdfSample scatter(const std::array<double, 3>& u) const noexcept {
         if (plain_) {
             BsdfSample s;
@@ -117,21 +117,21 @@ private:
 
 /// A path between its vertices.
 struct Path {
-    std::uint32_t ray = 0;  ///< of the camera
+    std::uint32_t ray = 0;  ///< index of the camera ray
     Rgb throughput{1, 1, 1};
-    Rgb* to = nullptr;         ///< where its light is added: to the camera's ray, or to a second vertex
-    float radiance_scale = 1;  ///< part of the throughput that is undone on leaving a dense medium, or that is no
-                               ///< part of what the path brings to the camera: not for the roulette
+    Rgb* to = nullptr;         ///< where its light is added: radiance of the camera's ray, or a second vertex
+    float radiance_scale = 1;  ///< factor of the throughput that Russian roulette ignores: radiance scaling that
+                               ///< leaving a dense medium undoes, and the change of weight at a second vertex
     double direction_pdf = std::numeric_limits<double>::infinity();  ///< of the ray, per solid angle
     double length_m = 0;                                             ///< from the camera to the vertex
-    Receiver start{};                  ///< of the ray, or of shadow rays; where anything needs it
-    SmallBodySampling small_bodies{};  ///< part in the choice of the next ray
-    bool sun_sampled = false;          ///< next-event estimation has found all sunlight along the ray
+    Receiver start{};                  ///< origin of the ray, or of shadow rays; set only if needed
+    SmallBodySampling small_bodies{};  ///< its share in sampling the next ray
+    bool sun_sampled = false;          ///< next-event estimation accounts for all sunlight along the ray
     // Path reuse:
-    bool lit = false;        ///< the direct light of its first surface is known, and it has survived there
-    bool sunlit = false;     ///< that light is not zero
-    int first_vertex = -1;   ///< number among FirstVertices; -1: none
-    int second_vertex = -1;  ///< number among the second vertices; -1: none
+    bool lit = false;     ///< the direct light of its first surface is known, and the path survived roulette there
+    bool sunlit = false;  ///< that light is not zero
+    int first_vertex = -1;   ///< index in FirstVertices; -1: none
+    int second_vertex = -1;  ///< index of the second vertex; -1: none
 };
 
 inline float max_component(const Rgb& c) noexcept {

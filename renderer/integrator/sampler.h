@@ -1,12 +1,12 @@
-/// renderer/integrator/sampler.h - the sample points of a pixel: a low-discrepancy set that depends on
-/// (seed, frame, pixel, sample) and nothing else.
+/// renderer/integrator/sampler.h - the sample points of a pixel: a low-discrepancy set that depends only on (seed,
+/// frame, pixel, sample).
 ///
 /// The first four dimensions of Sobol's sequence (direction numbers: S. Joe, F. Kuo, "Constructing Sobol sequences
 /// with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008), each nested-uniformly scrambled by a
 /// hash of the pixel (A. Owen 1995; B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). Any power
-/// of two of samples is stratified in each dimension, and in both of the pixel at once. Paths need more dimensions
-/// than that: they take further groups of four, each the same sequence in an order and a scrambling of its own
-/// (Burley's padding), so that every group is as well stratified and groups are independent.
+/// of two of samples is stratified in each dimension, and in the pixel's two jointly. Paths take further dimensions
+/// in groups of four, each group the same sequence with its own order and scrambling (Burley's padding), so that
+/// every group is equally well stratified and groups are independent.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 namespace narpa {
 
-/// Coordinates in [0, 1). Of the first group dimensions 0, 1 are the place in the pixel, 2, 3 the place on the
-/// lens, or on the Sun's disc where a camera has none.
+/// Coordinates in [0, 1). In the first group, dimensions 0, 1 are the position in the pixel, 2, 3 the position on
+/// the lens, or on the Sun's disc if there is no lens.
 using SamplePoint = std::array<double, 4>;
 
 namespace sampler_detail {
@@ -52,7 +52,8 @@ constexpr std::uint32_t reverse_bits(std::uint32_t x) {
     return __builtin_bswap32(x);
 }
 
-/// What each bit of an index brings to the four dimensions, lowest bit first, as scrambling takes it.
+/// Contribution of each bit of an index, lowest bit first, to the four dimensions, bit-reversed as scrambling needs
+/// it.
 inline constexpr auto kReversedSobol = [] {
     const std::array<Directions, 4> directions = sobol_directions();
     std::array<std::array<std::uint32_t, 4>, 32> by_bit{};
@@ -61,7 +62,7 @@ inline constexpr auto kReversedSobol = [] {
     return by_bit;
 }();
 
-/// Sobol's point of this index, the bits of its fractions reversed.
+/// Sobol's point of this index, its fractions bit-reversed.
 constexpr std::array<std::uint32_t, 4> reversed_sobol(std::uint32_t index) {
     std::array<std::uint32_t, 4> x{};
     for (; index != 0; index &= index - 1)
@@ -70,7 +71,7 @@ constexpr std::array<std::uint32_t, 4> reversed_sobol(std::uint32_t index) {
     return x;
 }
 
-/// Owen scrambling of a binary fraction whose bits stand reversed: each is flipped by a hash of those above it in
+/// Owen scrambling of a bit-reversed binary fraction: each bit is flipped by a hash of the more significant bits of
 /// the fraction (Laine and Karras, with the constants of N. Vegdahl's improvement).
 constexpr std::uint32_t scramble_reversed(std::uint32_t x, std::uint32_t seed) {
     x ^= x * 0x3d20adeau;
@@ -102,7 +103,7 @@ public:
     [[nodiscard]] constexpr SamplePoint point(std::uint32_t sample) const {
         return scrambled(sampler_detail::reversed_sobol(sample), key_);
     }
-    /// Another four dimensions, of any number of groups; group 0 is the one above.
+    /// Four further dimensions; group 0 is the function above.
     [[nodiscard]] constexpr SamplePoint point(std::uint32_t sample, std::uint32_t group) const {
         using sampler_detail::mix;
         if (group == 0) return point(sample);

@@ -10,19 +10,20 @@
 namespace narpa {
 namespace {
 
-/// The spot of a beam is at most 1 / this longer than wide: a bound for rays that graze.
-constexpr double kLeastCosine = 1e-3;
-/// The least cosine between the viewer and a normal that a map has turned.
-constexpr double kLeastFacing = 1e-3;
-/// 16 bits have no code for the middle, where a normal map is flat: those on either side of it are this far off.
+/// Bound for grazing rays: a footprint is at most 1 / this longer than wide.
+constexpr double kMinCosine = 1e-3;
+/// Smallest cosine between the viewer and a normal from a map.
+constexpr double kMinFacing = 1e-3;
+/// 16 bits have no code for 0.5, where a normal map is flat: the two nearest codes are this far off.
 constexpr float kNearMiddle = 1.0f / 65535 + 1e-6f;
-/// Rounding to 8 bits alone may shorten a normal by so much.
+/// Rounding to 8 bits may shorten a normal by this much.
 constexpr float kRounding = 1.0f / 255;
 
-/// How a texture lies in the plane at right angles to a normal.
+/// Texture axes in the plane perpendicular to a normal.
 struct Tangents {
     Vec3 along_u{}, along_v{};  ///< world metres per unit of u and of v
-    double det = 0;  ///< of along_u, along_v and the normal: negative where it is mirrored, 0 where none lies
+    double det = 0;  ///< determinant of along_u, along_v and the normal: negative if the texture is mirrored, 0 if
+                     ///< there is none
 };
 
 Tangents tangents(const TextureFrame& frame, const Vec3& n) {
@@ -39,7 +40,7 @@ TextureFootprint footprint_of_axes(double du1, double dv1, double du2, double dv
     return {axis(du1, dv1), axis(du2, dv2)};
 }
 
-/// What the beam's spot on the surface covers of the texture.
+/// Texture footprint of a pixel's beam on the surface.
 TextureFootprint spot(const TextureFrame& frame, const Hit& hit, const Vec3& ray_direction, double width_m,
                       TextureLayout layout) {
     const double half_m = 0.5 * width_m;
@@ -50,24 +51,24 @@ TextureFootprint spot(const TextureFrame& frame, const Hit& hit, const Vec3& ray
     const Tangents t = tangents(frame, n);
     if (t.det == 0) return globe ? footprint_of_axes(0.5, 0, 0, half_m / metres_per_v) : TextureFootprint{};
 
-    // The beam's circle, laid along the ray onto the surface: as wide as it was, longer by 1 / cos of the
-    // incidence, or less where a globe curves towards the viewer: half_m = x cos + x^2 / (2 R), solved for x.
-    const double cosine = std::max(std::abs(dot(n, ray_direction)), kLeastCosine);
+    // The beam's circle, projected along the ray onto the surface: same width, longer by 1 / cos of the incidence,
+    // or less where a globe curves away: half_m = x cos + x^2 / (2 R), solved for x.
+    const double cosine = std::max(std::abs(dot(n, ray_direction)), kMinCosine);
     const double curvature_1_m = globe ? std::numbers::pi / metres_per_v : 0;
     const double longer = 2 / (cosine + std::sqrt(cosine * cosine + 2 * half_m * curvature_1_m));
     Vec3 across = cross(n, ray_direction);
-    if (!(norm(across) > 1e-9)) across = t.along_v;  // straight on: any direction will do
+    if (!(norm(across) > 1e-9)) across = t.along_v;  // normal incidence: any direction will do
     across = half_m * normalized(across);
     const Vec3 along = longer * cross(n, across);
 
     const Vec3 du_per_m = (1 / t.det) * cross(t.along_v, n), dv_per_m = (1 / t.det) * cross(n, t.along_u);
     double du1 = dot(du_per_m, across), du2 = dot(du_per_m, along);
-    if (const double turn = 2 * std::hypot(du1, du2); globe && turn > 1) du1 /= turn, du2 /= turn;  // once around
+    if (const double turn = 2 * std::hypot(du1, du2); globe && turn > 1) du1 /= turn, du2 /= turn;  // one turn
     return footprint_of_axes(du1, dot(dv_per_m, across), du2, dot(dv_per_m, along));
 }
 
-/// The normal of a surface that rises with the texture: J. F. Blinn, "Simulation of wrinkled surfaces", SIGGRAPH
-/// 1978, for heights that are small against the radius of curvature.
+/// Bump mapping: J. F. Blinn, "Simulation of wrinkled surfaces", SIGGRAPH 1978, for heights that are small compared
+/// with the radius of curvature.
 Vec3 bumped(const Vec3& n, const TextureFrame& frame, const TextureSlope& slope_m) {
     const Tangents t = tangents(frame, n);
     if (t.det == 0) return n;
@@ -82,8 +83,8 @@ float about_middle(float code) {
     return std::abs(x) <= kNearMiddle ? 0 : x;
 }
 
-/// Tangent space as in glTF 2.0 (section 3.9.3) and MikkTSpace: x along u, made orthogonal to the normal; y at
-/// right angles to both on the side to which v grows; z the normal. `m` is the mean of the map's normals, shorter
+/// Tangent space as in glTF 2.0 (section 3.9.3) and MikkTSpace: x along u, made orthogonal to the normal; y
+/// perpendicular to both, on the side of growing v; z the normal. `m` is the mean of the map's normals, shorter
 /// than 1 where they differ.
 Vec3 mapped(const Vec3& n, const TextureFrame& frame, const Rgb& m, float scale) {
     const Tangents t = tangents(frame, n);
@@ -95,14 +96,14 @@ Vec3 mapped(const Vec3& n, const TextureFrame& frame, const Rgb& m, float scale)
     return length > 0 && std::isfinite(length) ? turned / length : n;
 }
 
-/// A lobe is wider where the normals under the beam differ, the more the shorter their mean: M. Toksvig,
+/// Widens a lobe where the normals in the footprint differ, the more the shorter their mean: M. Toksvig,
 /// "Mipmapping normal maps", Journal of Graphics Tools 10(3), 2005.
 float widened(float exponent, const Rgb& mean_normal) {
     const float length = std::min(1.0f, norm(mean_normal) + kRounding);
     return exponent * length / (length + exponent * (1 - length));
 }
 
-/// Clouds hide this share of the surface, band by band.
+/// Clouds cover this share of the surface, band by band.
 void cover(const Rgb& share, const Rgb& albedo, Surface& s) {
     const Rgb left = Rgb{1, 1, 1} - share;
     s.diffuse = left * s.diffuse + share * albedo;
@@ -110,15 +111,15 @@ void cover(const Rgb& share, const Rgb& albedo, Surface& s) {
     s.emission = left * s.emission;
 }
 
-/// A normal that points away from the viewer is turned back just so far that it is seen at a grazing angle: in the
-/// plane of the two, so that the side on which the surface is lit stays the same.
+/// Turns a normal that points away from the viewer back to a grazing angle, in the plane of the two, so that the
+/// surface stays lit from the same side.
 Vec3 towards_viewer(const Vec3& n, const Vec3& v, const Vec3& geometric) {
     const double facing = dot(n, v);
-    if (facing >= kLeastFacing) return n;
+    if (facing >= kMinFacing) return n;
     const Vec3 edge = n - facing * v;
     const double length = norm(edge);
     if (!(length > 1e-6)) return geometric;
-    return (std::sqrt(1 - kLeastFacing * kLeastFacing) / length) * edge + kLeastFacing * v;
+    return (std::sqrt(1 - kMinFacing * kMinFacing) / length) * edge + kMinFacing * v;
 }
 
 }  // namespace

@@ -11,10 +11,10 @@ namespace narpa {
 void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction,
                     double width_m, Surface& surface) noexcept;
 
-/// What stands at the hit, seen along `ray_direction` (unit, world, towards the surface) with a beam that is
-/// `width_m` wide there, measured across the ray: textures are averaged over what the beam covers. Normal and
-/// height maps turn Surface::normal, never to the far side of the ray. Inline, so that a material without textures
-/// costs no more than to copy it.
+/// The surface at the hit, seen along `ray_direction` (unit, world, towards the surface) with a footprint that is
+/// `width_m` wide there, measured across the ray: textures are filtered over the footprint. Normal and height maps
+/// turn Surface::normal, never away from the viewer. Inline, so that a material without textures costs no more than
+/// a copy.
 [[nodiscard]] inline Surface surface_at(const Tracer& tracer, const BodyPoses& at, const Hit& hit,
                                         const Vec3& ray_direction, double width_m) noexcept {
     const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];

@@ -13,7 +13,7 @@ double largest(const Vec3& v) {
     return std::max({v.x, v.y, v.z});
 }
 
-/// Two axes that complete the unit vector z; x is the direction of `towards` as z sees it, where it has one.
+/// Two axes that complete the unit vector z to a frame; x is the projection of `towards`, if that is not along z.
 std::array<Vec3, 2> frame_about(const Vec3& z, const Vec3& towards) {
     Vec3 x = towards - dot(towards, z) * z;
     if (norm(x) < 1e-9) {
@@ -80,12 +80,12 @@ std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, i
     if (has_air(disc.body) || !(2 * disc.radius_px < kSubpixelWidth_px)) return std::nullopt;
     if (lens_ != nullptr) {
         auto [x, y] = model_->jacobian(centre / centre.z);
-        x.z = y.z = 0;  // the aperture is a disc across the axis
+        x.z = y.z = 0;  // the aperture is perpendicular to the axis
         disc.radius_px += 0.5 * circle_of_confusion_px(*lens_, largest_stretch({x, y}), centre.z);
     }
     const auto [x, y] = *model_->project(centre);
     disc.x_px = x, disc.y_px = y;
-    const double margin = disc.radius_px * (1 + 1e-3) + sample_reach_px_ + 0.01;  // what perspective bends
+    const double margin = disc.radius_px * (1 + 1e-3) + sample_reach_px_ + 0.01;  // 1e-3: perspective
     if (x < x_first - margin || x > x_last + margin || y < y_first - margin || y > y_last + margin)
         return std::nullopt;
     span_disc(disc);
@@ -93,8 +93,8 @@ std::optional<SubpixelDisc> SubpixelBodies::disc_within(int body, int x_first, i
 }
 
 void SubpixelBodies::span_disc(SubpixelDisc& disc) const noexcept {
-    // In the space where the bounds are a unit sphere: the plane of the sphere's outline as the camera sees it, and
-    // the Sun. Straight lines, light and occlusion are preserved.
+    // In the space where the bounds are a unit sphere: the plane of the sphere's outline as seen by the camera, and
+    // the Sun. The affine map preserves straight lines, lighting and occlusion.
     const BodyBounds& bounds = tracer_.bounds(disc.body);
     const Rigid3& T = at_.T_world_body[disc.body];
     const Vec3 eye_body = conjugate(T.q) * (T_world_camera_.t - T.t) - bounds.centre_m;
@@ -104,7 +104,7 @@ void SubpixelBodies::span_disc(SubpixelDisc& disc) const noexcept {
     Vec3 to_sun{};
     if (const auto& sun = tracer_.scene().sun) {
         to_sun = normalized(conjugate(T.q) * sun->direction / bounds.semi_axes_m);
-        // The whole disc of the Sun counts: its edge rises first.
+        // The whole disc of the Sun counts: its upper edge rises first.
         const double phase = std::atan2(norm(cross(to_sun, z)), dot(to_sun, z));
         disc.lit = 0.5 * (1 + std::cos(std::max(0.0, phase - 0.5 * sun->angular_diameter_rad)));
     }
@@ -117,8 +117,8 @@ void SubpixelBodies::span_disc(SubpixelDisc& disc) const noexcept {
 }
 
 Hit SubpixelBodies::beyond(const Ray& ray, Hit hit) const noexcept {
-    // From each subpixel body the ray goes on as if that body were not there. It may meet others, even the first
-    // again behind a second; a ray through more surfaces of them than this sees nothing.
+    // Rays pass through subpixel bodies as if these were not there. They may meet several, even one of them twice;
+    // a ray through more than kSurfaces of their surfaces hits nothing.
     constexpr int kSurfaces = 64;
     double travelled_m = 0;
     for (int i = 0; i < kSurfaces && hit.body >= 0 && contains(hit.body); ++i) {

@@ -9,20 +9,20 @@
 namespace narpa {
 namespace {
 
-/// The surfaces met, lane by lane, of Lambert's and Phong's materials.
+/// Hit surfaces of Lambert's and Phong's materials, lane by lane.
 struct SurfaceLanes {
     RgbLanes diffuse, specular, emission;
     Lanes<float> exponent;
     Vec3Lanes normal;
-    std::uint32_t lanes = 0;   ///< those that are set
-    std::uint32_t shiny = 0;   ///< of them those with a lobe
+    std::uint32_t lanes = 0;   ///< lanes that are set
+    std::uint32_t shiny = 0;   ///< lanes with a lobe
     std::uint32_t others = 0;  ///< hits on materials of other kinds
 };
 
-/// Sunlight reflected along each ray, where nothing shades the surface.
+/// Unshadowed sunlight reflected along each ray.
 struct Sunlight {
     RgbLanes radiance;
-    std::uint32_t lanes = 0;  ///< where it is not zero
+    std::uint32_t lanes = 0;  ///< lanes where it is not zero
 };
 
 Surface surface_of(const Frame& f, const CameraBatch& p, std::size_t i) {
@@ -115,7 +115,7 @@ NARPA_EACH_ISA void reflect_sun(const SurfaceLanes& surfaces, const Vec3Lanes& d
             -(to_sun.x[i] * direction.x[i] + to_sun.y[i] * direction.y[i] + to_sun.z[i] * direction.z[i]);
         const double as_centre = to_sun.x[i] * centre.x + to_sun.y[i] * centre.y + to_sun.z[i] * centre.z;
         r_v[i] = 2 * n_l * n_v - l_v;
-        // The disc is sampled evenly as it faces.
+        // The disc is sampled uniformly in projected area.
         arriving[i] = irradiance * static_cast<float>(n_l / as_centre);
         faces[i] = static_cast<std::uint32_t>(n_l > 0) & static_cast<std::uint32_t>(n_v > 0);
     }
@@ -152,7 +152,7 @@ void light_other(const Frame& f, const CameraBatch& p, std::size_t i, RgbLanes& 
     sunlight.lanes |= 1u << i;
 }
 
-/// Adds it where `lit`.
+/// Adds sunlight in the lanes `lit`.
 NARPA_EACH_ISA void add_sunlight(const Sunlight& sunlight, std::uint32_t lit, RgbLanes& radiance) noexcept {
     RgbLanes out;
     for (std::size_t i = 0; i < kLanes; ++i) {
@@ -164,7 +164,7 @@ NARPA_EACH_ISA void add_sunlight(const Sunlight& sunlight, std::uint32_t lit, Rg
     radiance = out;
 }
 
-/// Traces the shadow rays of the lanes set, and adds what arrives.
+/// Traces the shadow rays of the lanes set, and adds the unshadowed sunlight.
 void add_sun(const Frame& f, CameraBatch& p, Sunlight& sunlight, PhaseClock& clock, RgbLanes& radiance) {
     clock.ends(Phase::shading);
     if (sunlight.lanes == 0) return;
@@ -174,7 +174,7 @@ void add_sun(const Frame& f, CameraBatch& p, Sunlight& sunlight, PhaseClock& clo
     if (p.lit != 0) add_sunlight(sunlight, p.lit, radiance);
 }
 
-/// Flat faces without too sharp a lobe: next-event estimation alone finds the Sun's light there.
+/// Lanes on flat faces whose lobe is not too sharp: next-event estimation alone suffices for the Sun there.
 NARPA_EACH_ISA std::uint32_t sunlit_by_nee_alone(const HitBatch& hits, const SurfaceLanes& surfaces) noexcept {
     const Vec3Lanes &flat = hits.geometric_normal, &n = surfaces.normal;
     Lanes<int> are;

@@ -10,8 +10,8 @@
 namespace narpa {
 namespace {
 
-/// Russian roulette: a path whose throughput is less than this may end; one that has found no light yet, as on
-/// night sides, only at less, and only behind so many vertices.
+/// Russian roulette: a path whose throughput is below kFaint may end; one that has found no light yet, as on night
+/// sides, only below kFaintUnlit and after kUnlitVertices vertices.
 constexpr float kFaint = 0.5f, kFaintUnlit = 0.25f;
 constexpr int kUnlitVertices = 4;
 
@@ -21,8 +21,8 @@ NARPA_EACH_ISA void draw_points(const PathNumbers& from, std::size_t n, const La
     BatchSampler(from.seed, from.frame, n, pixel, sample).points(group, u);
 }
 
-/// Assigns what `make` returns, without a temporary: parts of that would be stored in one size and loaded in
-/// another, for which processors wait.
+/// Assigns what `make` returns, without a temporary: storing that in parts and loading it whole would stall store
+/// forwarding.
 template <class T>
 void assign(T& to, const auto& make) {
     static_assert(std::is_trivially_destructible_v<T>);
@@ -70,7 +70,7 @@ void Wavefront::run(std::span<const Ray> rays, std::span<const Hit> first, std::
 
 void Wavefront::run_reused(std::span<const PathStart> starts, std::span<Rgb> radiance, std::span<float> variance) {
     grouped_ = !settings_.direct && settings_.max_depth > 1;
-    // Between the vertices that reuse joins nothing may absorb light.
+    // A medium would absorb light between the connected vertices.
     reuse_ = grouped_ && settings_.reuse && medium_ == nullptr;
     radiance_ = radiance;
     variance_ = variance;
@@ -115,9 +115,10 @@ void Wavefront::extend() {
     }
 }
 
-/// Adds what the rays have found; paths that have escaped, or that end here, leave.
+/// Adds the light that the rays found; removes paths that escaped or end here.
 void Wavefront::arrive(int vertex) {
-    // Method "direct": further rays only look for lamps, and the light that the air sends them is in `ambient`.
+    // Method "direct": rays beyond the first surface only look for area lights; the in-scattering that surfaces
+    // receive is in `ambient`.
     const bool in_medium = medium_ != nullptr && !(vertex > 0 && settings_.direct);
     if (in_medium) find_segments(vertex);
     std::size_t kept = 0;
@@ -140,7 +141,7 @@ void Wavefront::arrive(int vertex) {
     n_ = kept;
 }
 
-/// The medium along the rays.
+/// Computes the medium's effect along the rays.
 void Wavefront::find_segments(int vertex) {
     UninitializedArray<MediumRay, kWavefront> rays;
     for (std::size_t i = 0; i < n_; ++i) {
@@ -166,7 +167,7 @@ Rgb Wavefront::escaped(const Path& path, const Vec3& direction, int vertex) cons
     return radiance + Rgb{sunlight, sunlight, sunlight};
 }
 
-/// The surface at the end of the ray, and its emission.
+/// Makes the vertex at the hit, and adds its emission.
 void Wavefront::shade(std::size_t i) {
     Path& path = paths_[i];
     const Hit& hit = hits_[i];
@@ -185,14 +186,14 @@ void Wavefront::shade(std::size_t i) {
     if (receivers_) path.start = receiver_at(at_, hit, vertices_[i].plane());
 }
 
-/// Method "direct": the even light at a vertex.
+/// Method "direct": ambient light at a vertex.
 Rgb Wavefront::ambient(std::size_t i) const {
     if (medium_ == nullptr) return background_.ambient();
     const Hit& hit = hits_[i];
     return background_.ambient() + medium_->ambient(at_, hit.position, vertices_[i].surface().normal, hit.time);
 }
 
-/// Chooses the next rays, and ends paths that would bring little, or nothing.
+/// Chooses the next rays, and ends paths that would contribute little or nothing.
 void Wavefront::scatter(int vertex, bool last) {
     std::size_t kept = 0;
     Points u, roulette;
@@ -225,7 +226,7 @@ void Wavefront::scatter(int vertex, bool last) {
             const BsdfSample s = next_direction(i, {u[0][k], u[1][k], u[2][k], u[3][k]});
             path.throughput = path.throughput * s.weight;
             path.radiance_scale *= s.radiance_scale;
-            // Out of many shells of dense glass, one in another, it may outgrow single precision.
+            // The throughput may overflow single precision after leaving many nested shells of dense glass.
             if (path.throughput == Rgb{} || !is_finite(path.throughput)) continue;
             if (!is_first && !survives(survival(path, vertex + 1))) continue;
             if (SecondVertex* const second = second_vertex(path, vertex);
@@ -252,29 +253,29 @@ BsdfSample Wavefront::next_direction(std::size_t i, const SamplePoint& numbers) 
     if (choice < share)
         s.l = path.small_bodies.direction(tracer_, at_, path.start, choice / share, u, v);
     else if (s = vertices_[i].scatter({lobe, u, v}); s.weight == Rgb{})
-        return s;  // below the surface: folded above it, it is none of the directions that `respond` counts
+        return s;  // below the surface; `respond` counts only directions above it
     const PathVertex::Response r = vertices_[i].respond(s.l);
     s.pdf = scatter_pdf(path, s.l, r.pdf);
     s.weight = r.f_cos == Rgb{} ? Rgb{} : r.f_cos * static_cast<float>(1 / s.pdf);
     return s;
 }
 
-/// Density per solid angle with which `next_direction` finds what the BSDF alone finds with `bsdf_pdf`.
+/// Density per solid angle of `next_direction` for a direction that the BSDF alone chooses with `bsdf_pdf`.
 double Wavefront::scatter_pdf(const Path& path, const Vec3& direction, double bsdf_pdf) const {
     const double share = path.small_bodies.share();
     if (share == 0) return bsdf_pdf;
     return (1 - share) * bsdf_pdf + share * path.small_bodies.pdf(tracer_, at_, path.start, direction);
 }
 
-/// Probability with which a path survives the roulette behind so many vertices.
+/// Probability that a path survives the roulette after this many vertices.
 float Wavefront::survival(const Path& path, int vertices) const {
-    // Light of a wide Sun is found by two techniques, weighted by MIS: roulette would make one of them noisy.
+    // A wide Sun is sampled by two techniques, weighted by MIS: roulette would make one of them noisy.
     const bool nothing_yet = radiance_[path.ray] == Rgb{} && !path.sunlit;
     const bool unlit = nothing_yet || (sun_has_extent_ && !narrow_sun_);
     if (unlit && vertices < kUnlitVertices) return 1;
     return std::min(1.0f, max_component(path.throughput) / path.radiance_scale / (unlit ? kFaintUnlit : kFaint));
 }
-/// The same of a path that is reused, at its first vertex, before the direction is known.
+/// The same for a reused path at its first vertex, before the direction is known.
 float Wavefront::first_survival(const Rgb& albedo, bool unlit) const {
     if (finds_alone_) return 1;
     return settings_.first_survival * std::min(1.0f, max_component(albedo) / (unlit ? kFaintUnlit : kFaint));
@@ -319,7 +320,8 @@ void Wavefront::begin_reused(std::span<const PathStart> starts) {
     }
 }
 
-/// Of unlit first surfaces only: on sunlit ones the light of small bodies is a small part, and so is its noise.
+/// For unlit first surfaces only: on sunlit ones the light of small bodies, and so its noise, is comparatively
+/// small.
 void Wavefront::sample_small_bodies(Path& path, const PathStart& unlit) const {
     const Hit hit = (*unlit.hits)[unlit.lane];
     path.start = receiver_at(at_, hit, hit.geometric_normal);

@@ -1,14 +1,13 @@
-/// renderer/integrator/wavefront.h - the kernel of light transport: many paths, one vertex at a time.
+/// renderer/integrator/wavefront.h - wavefront light transport: many paths, advanced one vertex at a time.
 ///
 /// Each round
-///   extend:  traces the ray of every path; light of escaped rays and emission are added;
-///   connect: at the vertices met, next-event estimation collects shadow rays, traces them in batches and adds what
-///            arrives;
+///   extend:  traces the ray of every path; adds emission and the light of escaped rays;
+///   connect: next-event estimation at the vertices; shadow rays are traced in batches;
 ///   scatter: Russian roulette, then BSDF sampling of the next ray.
-/// Paths that have ended leave the arrays, so that batches stay full. What becomes of a path follows from its own
-/// ray and its own random numbers, unless paths are reused.
+/// Finished paths are removed from the arrays, so that batches stay full. The result of a path depends only on its
+/// own ray and random numbers, unless paths are reused.
 ///
-/// Direct lighting is one round of it, path tracing max_depth. Used by path.h alone.
+/// Direct lighting is one round, path tracing max_depth rounds. Used only by path.h.
 #pragma once
 
 #include "base/uninitialized_array.h"
@@ -21,19 +20,19 @@
 
 namespace narpa {
 
-/// Paths on their way together.
+/// Maximum number of paths traced together.
 inline constexpr std::size_t kWavefront = 128;
 static_assert(kWavefront % kLanes == 0);
 
-/// A shadow ray, and what it carries.
+/// A shadow ray and its contribution.
 struct ShadowRay {
-    std::size_t path;  ///< it leaves the vertex of this path
+    std::size_t path;  ///< path whose current vertex it leaves
     Vec3 direction{};
     double range_m;      ///< to the light; infinite for the Sun and the background
-    Rgb* to;             ///< where it is added, if nothing is in the way:
-    Rgb contribution{};  ///< for emissive surfaces: per radiance
-    // Of an emissive surface, which the ray must meet:
-    double scatter_pdf;  ///< with which BSDF sampling finds the direction
+    Rgb* to;             ///< where the contribution is added if unoccluded
+    Rgb contribution{};  ///< for emissive surfaces: per unit of radiance
+    // For an emissive surface, which the ray must hit:
+    double scatter_pdf;  ///< density with which BSDF sampling chooses the direction
     int body;
     std::uint32_t face;
 };
@@ -43,9 +42,9 @@ public:
     Wavefront(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
               const PathNumbers& numbers);
 
-    /// Each path by itself. Spans as of path_radiance; at most kWavefront rays.
+    /// Traces each path on its own. Spans as in path_radiance; at most kWavefront rays.
     void run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance);
-    /// With path reuse. As of reused_path_radiance.
+    /// With path reuse; see reused_path_radiance.
     void run_reused(std::span<const PathStart> starts, std::span<Rgb> radiance, std::span<float> variance);
     [[nodiscard]] std::uint64_t rays_traced() const { return rays_traced_; }
 
@@ -89,7 +88,7 @@ private:
     [[nodiscard]] SecondVertex* second_vertex(const Path& path, int vertex);
     void reuse();
 
-    /// Random numbers of the batch that begins with this path.
+    /// Draws the sample dimensions of a group for the batch that begins with path `first`.
     void draw(std::size_t first, std::uint32_t group, Points& u) const;
     void keep(std::size_t from, std::size_t to);
     static void add(const Path& path, const Rgb& radiance) { *path.to += path.throughput * radiance; }
@@ -102,33 +101,33 @@ private:
     const BodyPoses& at_;
     const PathSettings& settings_;
     const PathNumbers numbers_;
-    // What the scene has, so that nothing is done for what it has not:
+    // Features of the scene; absent ones cost nothing:
     const Lights::Group group_;
     const SunDisc* const sun_;
     const bool sun_has_extent_, narrow_sun_;
-    const bool small_bodies_;  ///< some body may look small from another
-    const bool emitters_;      ///< beside the Sun
+    const bool small_bodies_;  ///< some body may have a small angular size from another
+    const bool emitters_;      ///< emitters other than the Sun exist
     const bool background_sampled_;
     const bool receivers_;    ///< Path::start is needed
-    const bool finds_alone_;  ///< escaped rays bring light that is not reused: background, a wide Sun
-    const bool sun_alone_;    ///< nothing else brings light
-    bool grouped_ = false;    ///< paths of several pixels (run_reused), with the roulette at their first vertices
+    const bool finds_alone_;  ///< escaped rays find light that is not reused: background, a wide Sun
+    const bool sun_alone_;    ///< the Sun is the only source of light
+    bool grouped_ = false;    ///< paths of several pixels (run_reused), with roulette at their first vertices
     bool reuse_ = false;
 
     std::span<Rgb> radiance_;
     std::span<float> variance_;
     std::uint64_t rays_traced_ = 0;
 
-    std::size_t n_ = 0;  ///< paths that have not ended
+    std::size_t n_ = 0;  ///< number of active paths
     template <class T>
     using PerPath = UninitializedArray<T, kWavefront>;
     PerPath<Path> paths_;
     PerPath<PathVertex> vertices_;
     PerPath<Vec3> directions_;         ///< of the rays
     PerPath<MediumSegment> segments_;  ///< along the rays, where there is a medium
-    PerPath<Hit> hits_;                ///< where the rays start; after `extend` where they end
+    PerPath<Hit> hits_;                ///< start points of the rays; after `extend` their hits
     std::size_t n_shadow_ = 0, n_to_lights_ = 0, n_to_surfaces_ = 0;
-    PerPath<ShadowRay> shadow_rays_;  ///< without an end
+    PerPath<ShadowRay> shadow_rays_;  ///< of infinite length
     PerPath<ShadowRay> to_lights_, to_surfaces_;
     std::size_t n_second_ = 0;
     UninitializedArray<SecondVertex, kReuseGroup> second_;

@@ -8,7 +8,7 @@
 namespace narpa {
 namespace {
 
-/// At a second vertex what counts is the light that falls in.
+/// Makes the ray deliver incident light to a second vertex.
 void receive(SecondVertex& second, std::size_t kind, const Vec3& from, const Rgb& light, ShadowRay& ray) {
     second.incident[kind].from = from;
     ray.to = &second.incident[kind].light;
@@ -30,7 +30,7 @@ void Wavefront::connect(int vertex, bool lit_surfaces_count) {
             path.sun_sampled = false;
             path.small_bodies = SmallBodySampling();
             if (vertices_[i].specular()) continue;
-            // Known before the shadow rays, whose MIS weights need its density.
+            // Set before the shadow rays, whose MIS weights need its density.
             if (small_bodies_ && lit_surfaces_count)
                 path.small_bodies = SmallBodySampling(tracer_, at_, path.start);
             SecondVertex* const second = second_vertex(path, vertex);
@@ -38,7 +38,7 @@ void Wavefront::connect(int vertex, bool lit_surfaces_count) {
             if (emitters_) sample_emitters(i, u[2][k], u[0][k], u[1][k], second);
             if (background_sampled_) sample_background(i, to_background[0][k], to_background[1][k], second);
         }
-        // Two for each path at most: the Sun's and the background's.
+        // At most two per path: the Sun's and the background's.
         if (background_sampled_) trace_shadow_rays(shadow_rays_, n_shadow_), n_shadow_ = 0;
     }
     trace_shadow_rays(shadow_rays_, n_shadow_);
@@ -46,10 +46,11 @@ void Wavefront::connect(int vertex, bool lit_surfaces_count) {
     trace_to_surfaces();
 }
 
-/// A point of the Sun's disc.
+/// Samples a point of the Sun's disc.
 void Wavefront::sample_sun(std::size_t i, double u, double v, SecondVertex* second) {
     const Vec3 to_sun = sun_has_extent_ ? sun_->sample(u, v) : sun_->centre();
-    // Escaped rays find the disc as well, unless it is a point, or nothing beyond the first surface counts.
+    // Escaped rays find the disc as well, unless it is a point, or the method is direct, or the Sun is narrow and
+    // there is no lobe.
     const bool alone = !sun_has_extent_ || settings_.direct || (narrow_sun_ && vertices_[i].has_no_lobe());
     paths_[i].sun_sampled = alone;
     const PathVertex::Response r = vertices_[i].respond(to_sun);
@@ -67,7 +68,7 @@ void Wavefront::sample_sun(std::size_t i, double u, double v, SecondVertex* seco
     receive(*second, SecondVertex::sun, to_sun, {light, light, light}, ray);
 }
 
-/// A point of one of the other emitters.
+/// Samples a point of one of the other emitters.
 void Wavefront::sample_emitters(std::size_t i, double choice, double u, double v, SecondVertex* second) {
     const Path& path = paths_[i];
     const std::optional<LightSample> light = lights_.sample(at_, path.start, group_, choice, u, v);
@@ -105,7 +106,7 @@ void Wavefront::sample_background(std::size_t i, double u, double v, SecondVerte
     if (second != nullptr) receive(*second, SecondVertex::background, s.direction, arriving, ray);
 }
 
-/// Shadow rays side by side.
+/// Shadow rays traced together.
 struct Wavefront::ShadowBatch {
     SurfacePoints from;
     Vec3Lanes directions;
@@ -143,7 +144,7 @@ void Wavefront::trace_shadow_rays(PerPath<ShadowRay>& rays, std::size_t n) {
     }
 }
 
-/// Rays to emissive surfaces: what they meet must be the point that was sampled.
+/// Rays to emissive surfaces: the light counts only if the hit is on the sampled face.
 void Wavefront::trace_to_surfaces() {
     ShadowBatch b;
     HitBatch found;
@@ -157,7 +158,7 @@ void Wavefront::trace_to_surfaces() {
             const Hit hit = found[k];
             const Path& path = paths_[ray.path];
             const double pdf = lights_.pdf(at_, path.start, group_, ray.direction, hit);
-            if (!(pdf > 0)) return;  // met where the ray starts
+            if (!(pdf > 0)) return;  // hit at the ray's own origin
             const double weight = power_heuristic(pdf, ray.scatter_pdf);
             Rgb light = ray.contribution * emission(path, ray.direction, hit) * static_cast<float>(weight / pdf);
             if (medium_ != nullptr) light = light * transmittance(ray.path, ray.direction, hit.range_m);

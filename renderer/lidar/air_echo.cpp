@@ -5,19 +5,20 @@
 namespace narpa {
 namespace {
 
-/// Of the threshold. Noise alone crosses it in any gate; that is not the medium's echo.
+/// Share of the detection threshold below which a gate is ignored: a crossing there would be due to noise, not to
+/// the medium.
 constexpr double kFaintestGate = 0.1;
 
 }  // namespace
 
-AirEcho::AirEcho(const LidarReceiverModel& model, double least_light, const Medium* medium) noexcept
+AirEcho::AirEcho(const LidarReceiverModel& model, double min_light, const Medium* medium) noexcept
     : medium_(medium),
-      least_light_(least_light),
+      min_light_(min_light),
       snr_(model.detection_snr),
       gate_m_(model.pulse_length_m),
       start_m_(std::max(model.range_min_m, model.pulse_length_m)) {
-    if (medium == nullptr || !(least_light > 0)) return;
-    reach_m_ = std::sqrt(medium->most_lidar_backscatter_1_m() * gate_m_ / (kFaintestGate * least_light));
+    if (medium == nullptr || !(min_light > 0)) return;
+    reach_m_ = std::sqrt(medium->max_lidar_backscatter_1_m() * gate_m_ / (kFaintestGate * min_light));
 }
 
 Medium::Backscatter AirEcho::first(const BodyPoses& at, const Ray& ray, double nearest_m, double noise,
@@ -26,7 +27,7 @@ Medium::Backscatter AirEcho::first(const BodyPoses& at, const Ray& ray, double n
     const double end_m = std::min(reach_m_, nearest_m) - gate_m_;
     for (double from_m = start_m_; from_m < end_m; from_m += gate_m_) {
         const Medium::Backscatter gate = medium_->lidar_backscatter(at, ray, from_m, from_m + gate_m_);
-        const double x = gate.light / least_light_;
+        const double x = gate.light / min_light_;
         if (x < kFaintestGate) continue;
         missed *= 1 - detection_probability(x / noise, snr_);
         if (u >= missed) return gate;

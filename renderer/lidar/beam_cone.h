@@ -1,7 +1,7 @@
 /// renderer/lidar/beam_cone.h - the rays that sample a LiDAR's beam.
 ///
-/// A beam is an evenly lit cone. Its rays are spread evenly over the disc that it lights: a lattice by the golden
-/// section (Vogel 1979), turned about the axis at random from shot to shot, so that no edge favours the lattice.
+/// A beam is a uniformly lit cone. Its rays sample the lit disc on a golden-angle lattice (Vogel 1979), turned
+/// about the axis at random for each shot, so that the lattice causes no bias at edges.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +18,11 @@ public:
         Vec3 x, y;
     };
 
-    /// `divergence_rad`: the full angle. One ray alone is the axis. Allocates here and never again.
+    /// `divergence_rad`: the full angle. One ray alone is the axis. Allocates only here.
     BeamCone(double divergence_rad, int rays);
 
     [[nodiscard]] std::size_t size() const noexcept { return x_.size(); }
-    /// Of half the full angle; 0 of one ray alone.
+    /// Tangent of half the full angle; 0 for a single ray.
     [[nodiscard]] double tangent() const noexcept { return tangent_; }
     /// `beam`: a unit vector. `turn`: 32 random bits.
     [[nodiscard]] static Across across(const Vec3& beam, std::uint32_t turn) noexcept;
@@ -36,7 +36,7 @@ public:
 
 private:
     double tangent_ = 0;
-    std::vector<double> x_, y_;  ///< of each ray from the axis, at a distance of 1
+    std::vector<double> x_, y_;  ///< offset of each ray from the axis, at a distance of 1
 };
 
 }  // namespace narpa

@@ -11,14 +11,15 @@
 namespace narpa {
 namespace {
 
-/// Of the distance: more than what single precision here, and a ray that is traced again slightly turned, are off.
+/// Relative to the distance: more than the error of single precision and of a ray that is traced again slightly
+/// turned.
 constexpr float kBeamSlack = 2e-6f;
-/// Boxes of a tree that beams are held against, of cones and of single rays. More cost more time and leave out more
-/// beams: at the docking station 127 take 1.05 of the time with 8 sub-rays, 2047 take 1.01; with one ray 511
-/// take 1.08.
-constexpr std::size_t kMostBoxes = 511, kMostForRays = 127;
-/// Directions along an axis have no reciprocal.
-constexpr float kLeastDirection = 1e-12f;
+/// Most boxes of a tree that are tested, for cones and for single rays. More boxes cull more beams and cost more
+/// time. Relative times at the docking station: with 8 sub-rays 1.05 for 127 boxes and 1.01 for 2047; with one ray
+/// 1.08 for 511.
+constexpr std::size_t kMaxBoxes = 511, kMaxForRays = 127;
+/// Least component of a direction, so that its reciprocal is finite.
+constexpr float kMinDirection = 1e-12f;
 
 /// The beams, cones about the rays, that may meet the bounds of a body: its sphere and its ellipsoid.
 NARPA_EACH_ISA void find_meeting_body(const RayBatch& beams, const PoseLanes& T_world_body, double body_radius_m,
@@ -53,15 +54,16 @@ NARPA_EACH_ISA void find_meeting_body(const RayBatch& beams, const PoseLanes& T_
 struct alignas(64) LocalBeams {
     Lanes<float> x, y, z;              ///< where they start, metres
     Lanes<float> per_x, per_y, per_z;  ///< 1 / direction
-    Lanes<float> slack_m;              ///< what a single ray needs at the body's far end
+    Lanes<float> slack_m;              ///< margin of a single ray, for the body's far end
 };
 
-/// Places in the frame are off by what single precision makes of the mesh's size and of the distance.
+/// Transforms beams to the frame of a body, with margins for single precision: relative to the mesh's size and to
+/// the distance.
 NARPA_EACH_ISA void to_body(const RayBatch& beams, const PoseLanes& T_world_body, double radius_m,
                             LocalBeams& __restrict local) {
     const auto reciprocal = [](double direction) {
         const auto d = static_cast<float>(direction);
-        return 1 / std::copysign(std::max(std::abs(d), kLeastDirection), d);
+        return 1 / std::copysign(std::max(std::abs(d), kMinDirection), d);
     };
     for (std::size_t i = 0; i < kLanes; ++i) {
         const Rigid3 T = T_world_body[i];
@@ -77,7 +79,8 @@ NARPA_EACH_ISA void to_body(const RayBatch& beams, const PoseLanes& T_world_body
     }
 }
 
-/// As bits_of, by halves: of its loop GCC makes sixteen extractions where it stands behind another.
+/// Same as bits_of, by halving: GCC compiles the loop of bits_of to sixteen extractions where it follows another
+/// loop.
 inline std::uint32_t bits_of_masks(const Lanes<int>& masks) {
     using Sixteen [[gnu::vector_size(64)]] = int;
     using Eight [[gnu::vector_size(32)]] = int;
@@ -93,12 +96,12 @@ inline std::uint32_t bits_of_masks(const Lanes<int>& masks) {
     return static_cast<std::uint32_t>(four[0] | four[1] | four[2] | four[3]);
 }
 
-/// Of beams: half of their widening, and their end.
+/// Tangent of half the full angle of beams, and their greatest range.
 struct BeamReach {
     float tangent, end_m;
 };
 
-/// The beams that touch the box, grown by as much as a beam is wide at the box's far end.
+/// The beams that touch the box, grown by half the width of a beam at the box's far end.
 template <bool cones>
 std::uint32_t touching(const BeamBox& box, const LocalBeams& beams, const BeamReach& reach) {
     const BeamBox b = box;
@@ -108,7 +111,7 @@ std::uint32_t touching(const BeamBox& box, const LocalBeams& beams, const BeamRe
         const float x = b.x - beams.x[i], y = b.y - beams.y[i], z = b.z - beams.z[i];
         float grow_m = beams.slack_m[i];
         if constexpr (cones) grow_m += own_m + tangent * std::sqrt(x * x + y * y + z * z);
-        // Along each axis: where the beam is half-way through, and as much before and behind.
+        // Slab test on each axis: middle and half length of the interval within the box.
         const float mid_x = x * beams.per_x[i], half_x = (b.half_x + grow_m) * std::abs(beams.per_x[i]);
         const float mid_y = y * beams.per_y[i], half_y = (b.half_y + grow_m) * std::abs(beams.per_y[i]);
         const float mid_z = z * beams.per_z[i], half_z = (b.half_z + grow_m) * std::abs(beams.per_z[i]);
@@ -119,11 +122,11 @@ std::uint32_t touching(const BeamBox& box, const LocalBeams& beams, const BeamRe
     return bits_of_masks(met);
 }
 
-/// Those of the beams that touch a leaf.
+/// The beams that touch a leaf.
 template <bool cones>
 std::uint32_t touching_leaves(std::span<const BeamBox> boxes, const LocalBeams& beams, const BeamReach& reach,
                               std::uint32_t wanted) {
-    std::array<std::uint32_t, kMostBoxes> open;  // one more with each step down
+    std::array<std::uint32_t, kMaxBoxes> open;  // stack; grows by one with each level
     std::size_t n = 0;
     open[n++] = 0;
     std::uint32_t found = 0;
@@ -148,7 +151,7 @@ NARPA_EACH_ISA std::uint32_t leaves_on_rays(std::span<const BeamBox> boxes, cons
     return touching_leaves<false>(boxes, beams, reach, wanted);
 }
 
-/// The first boxes of a tree, which are the largest; those whose children are left out become leaves.
+/// The first boxes of a tree, which are the largest; a box whose children are left out becomes a leaf.
 std::vector<BeamBox> beam_boxes(std::span<const BoxNode> nodes, std::size_t most) {
     std::vector<BeamBox> boxes;
     for (const BoxNode& node : nodes.first(std::min(nodes.size(), most))) {
@@ -165,7 +168,7 @@ std::vector<BeamBox> beam_boxes(std::span<const BoxNode> nodes, std::size_t most
 
 BeamCulling::BeamCulling(const Tracer& tracer, double tangent, double range_max_m)
     : tracer_(tracer), tangent_(tangent), range_max_m_(range_max_m) {
-    const std::size_t most = tangent > 0 ? kMostBoxes : kMostForRays;
+    const std::size_t most = tangent > 0 ? kMaxBoxes : kMaxForRays;
     for (const std::uint32_t body : tracer.all_bodies()) {
         const auto same = std::ranges::find(shapes_, &tracer.shape(body), &BoxedShape::shape);
         shape_of_body_.push_back(static_cast<std::size_t>(same - shapes_.begin()));

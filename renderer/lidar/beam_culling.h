@@ -1,8 +1,8 @@
 /// renderer/lidar/beam_culling.h - which bodies a LiDAR's beams may meet.
 ///
-/// Most beams of a turn meet nothing, also where the bodies' ellipsoids are all around the LiDAR, as that of its
-/// own mount is. A beam, a cone, is held against the boxes about the parts of a body (Shape::boxes), sixteen beams
-/// side by side; only those that touch a box are traced.
+/// Most beams of a rotation hit nothing, even where the LiDAR is inside a bounding ellipsoid, as in that of its own
+/// mount. Beams, which are cones, are tested against a body's tree of boxes (Shape::boxes), sixteen at a time; only
+/// those that touch a leaf are traced.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace narpa {
 
-/// A box along a body's axes, of a tree, by its middle; metres.
+/// Node of a tree of boxes along a body's axes, by centre and half extents; metres.
 struct BeamBox {
     float x, y, z, half_x, half_y, half_z;
     float radius;
@@ -22,12 +22,12 @@ struct BeamBox {
 
 class BeamCulling {
 public:
-    /// `tangent`: of half the beams' full angle. Nothing beyond `range_max_m` counts. The tracer must outlive it.
-    /// Allocates here alone.
+    /// `tangent`: of half the beams' full angle. Surfaces beyond `range_max_m` are ignored. The tracer must outlive
+    /// it. Allocates only here.
     BeamCulling(const Tracer& tracer, double tangent, double range_max_m);
 
-    /// Returns those of the beams that may meet a body. Conservative: no ray within a beam's cone meets the surface
-    /// of any other body before the range's end.
+    /// Returns the beams that may hit a body. Conservative: no ray within a beam's cone meets the surface of any
+    /// other body before the range's end.
     [[nodiscard]] std::uint32_t find_meeting(const BodyPoses& at, const RayBatch& beams) noexcept;
     /// The bodies that any of these beams of the batch may meet.
     [[nodiscard]] std::span<const std::uint32_t> bodies_of(std::uint32_t beams) noexcept;

@@ -9,22 +9,22 @@
 namespace narpa {
 namespace {
 
-/// Frame numbers of the sampler, so that pixels of cameras draw others.
+/// Frame numbers of the sampler, distinct from those of camera pixels.
 constexpr std::uint32_t kLidarStream = 0x4c000000u;
 
-/// The LiDAR has one band: what the mean of three stands for.
+/// The value of the LiDAR's single band: the mean of the three.
 double one_band(const Rgb& c) {
     return static_cast<double>(mean_band(c));
 }
 
-/// A ray on from where a sub-ray ends, B.
+/// Rays that continue from the points B where sub-rays end.
 struct BounceRays {
     std::uint32_t wanted = 0;
     Vec3Lanes direction;
     Lanes<double> weight;  ///< f cosine / pdf
 };
 
-/// The surface that such a ray meets, A, as seen from the LiDAR.
+/// The surfaces A that such rays hit, as seen from the LiDAR.
 struct SecondSurfaces {
     std::uint32_t lanes = 0;
     Vec3Lanes to_lidar;
@@ -43,7 +43,7 @@ void choose_bounce(const Tracer& tracer, const BodyPoses& at, const Hit& hit, co
     out.weight[i] = weight;
 }
 
-/// Its light as if the pulse lit it and nothing stood between: the caller tests both.
+/// Stores the light of surface A as if the pulse lit it and nothing occluded it: the caller tests both.
 void put_second_surface(const Tracer& tracer, const BodyPoses& at, const Ray& ray, const BounceRays& bounces,
                         const Hit& hit, std::size_t i, SecondSurfaces& out) {
     const Vec3 home = ray.origin - hit.position;
@@ -58,12 +58,12 @@ void put_second_surface(const Tracer& tracer, const BodyPoses& at, const Ray& ra
     if (out.light[i] > 0) out.lanes |= 1u << i;
 }
 
-/// From the LiDAR to B, from there to A, and back to the LiDAR. Light takes it the other way, to the same effect.
+/// Path from the LiDAR to B, to A and back to the LiDAR. Light travels it in reverse, with the same result.
 struct Way {
     Ray there, across, home;
 };
 
-/// Of the way's length; half of it, as ranges are.
+/// Half the rate of change of the path's length, as ranges are half of it.
 double half_rate(const ShotSettings& settings, const BodyPoses& at, const Way& way, int body_b, int body_a) {
     const Vec3 lidar = velocity_at(settings, at, settings.mount, way.there.origin, way.there.time),
                b = velocity_at(settings, at, body_b, way.across.origin, way.across.time),

@@ -10,13 +10,13 @@
 namespace narpa {
 namespace {
 
-/// Sub-rays whose ranges are farther apart than so many times their mean distance are of different surfaces.
+/// Sub-rays whose ranges are farther apart than this many mean spacings belong to different surfaces.
 constexpr double kMeanSpacings = 6;
 /// Random numbers: c2 of the counters, above those of a camera (SensorDraw). One block for each echo of a shot.
 constexpr std::uint32_t kStream = 0x4c000000u, kEchoStream = 0x10000u;
 
-/// Number of the medium's own echo, behind those of surfaces.
-constexpr std::size_t kAirEcho = LidarReceiver::kMostEchoes;
+/// Number of the medium's own echo, after those of surfaces.
+constexpr std::size_t kAirEcho = LidarReceiver::kMaxEchoes;
 
 /// Uniform in (0, 1).
 double uniform(std::uint32_t word) {
@@ -29,7 +29,7 @@ double light_of(const LidarReturn& r) {
 
 }  // namespace
 
-/// The random numbers of a batch, made as they are needed.
+/// The random numbers of a batch, generated on demand.
 class LidarReceiver::Draws {
 public:
     Draws(const LidarReceiver& receiver, std::uint64_t first) : receiver_(receiver), first_(first) {}
@@ -57,7 +57,7 @@ LidarReceiver::LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint
       mount_(lidar.mount),
       sunlight_(sees_sunlight(lidar)),
       reports_sunlight_(lidar.model && lidar.model->spec().measures_sunlight),
-      least_light_(model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0),
+      min_light_(model_.range_at_10_percent_m > 0 ? 0.1 / std::pow(model_.range_at_10_percent_m, 2) : 0),
       random_(model_.range_noise_m > 0 || model_.range_noise_at_limit_m > 0 || model_.velocity_noise_m_s > 0),
       schedule_(seed),
       stream_(kStream + static_cast<std::uint32_t>(index)),
@@ -123,12 +123,12 @@ float LidarReceiver::sunlight_in_air(const BodyPoses& at, const Ray& beam, doubl
                               medium_->lidar_in_scattering(at, beam, range_m, u));
 }
 
-/// Noise of the receiver over its noise in the dark.
+/// Noise of the receiver relative to that in the dark.
 double LidarReceiver::noise_in(double sunlight) const noexcept {
     return std::sqrt(1 + model_.sunlight_noise * sunlight);
 }
 
-/// The medium's own, along the beam's axis; without one its light is 0.
+/// The medium's own echo, along the beam's axis; if there is none, its light is 0.
 LidarReceiver::Echo LidarReceiver::air_echo(const BodyPoses& at, const Ray& beam, const ShotSettings& settings,
                                             std::span<const LidarReturn> met, double noise,
                                             double u) const noexcept {
@@ -143,7 +143,8 @@ LidarReceiver::Echo LidarReceiver::air_echo(const BodyPoses& at, const Ray& beam
     return {light, range_m, dot(beam.direction, velocity)};
 }
 
-/// Sub-rays of a beam run side by side, so they are traced together, through the bodies that their beams may meet.
+/// Sub-rays of a beam are nearly parallel, so they are traced in one batch, through the bodies that their beams may
+/// hit.
 void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
                           ShotSettings settings, Draws& draws) noexcept {
     const std::size_t sub_rays = cone_.size();
@@ -164,7 +165,7 @@ void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint6
         const std::size_t begin = k;
         while (rays.n < kLanes && k < count * sub_rays) {
             const std::size_t i = beam[k / sub_rays], s = k % sub_rays, n = std::min(sub_rays - s, kLanes - rays.n);
-            // Of the first sub-ray alone, which is the nearest to the axis.
+            // Sunlight of the first sub-ray alone, which is the nearest to the axis.
             if (sunlight && s == 0) settings.sunlight |= 1u << rays.n;
             if (multipath_.is_on())
                 for (std::size_t j = 0; j < n; ++j)
@@ -181,7 +182,7 @@ void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint6
     }
 }
 
-/// Of one of `n` rays of a beam.
+/// Adds the light of one of `n` rays of a beam.
 void LidarReceiver::add_light(const LidarReturn& r, double n, Echo& echo) noexcept {
     const double light = light_of(r) / n;
     if (!(light > 0)) return;
@@ -191,7 +192,7 @@ void LidarReceiver::add_light(const LidarReturn& r, double n, Echo& echo) noexce
     echo.velocity_m_s += share * (r.velocity_m_s - echo.velocity_m_s);
 }
 
-/// Of `n` sub-rays those that make one echo, whose nearest is at `nearest_m`.
+/// Makes one echo of the returns `met`, of a beam of `n` sub-rays.
 LidarReceiver::Echo LidarReceiver::echo_of(std::span<const LidarReturn> met, double nearest_m, double farthest_m,
                                            double n) noexcept {
     double light = 0, moment = 0, velocity = 0, velocity_of_nearest = 0;
@@ -233,7 +234,7 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
               [](const LidarReturn& a, const LidarReturn& b) { return a.range_m < b.range_m; });
     const double gap_m = std::max(model_.pulse_length_m, kMeanSpacings * (farthest_m - nearest_m) / n);
     std::size_t count = 0;
-    for (auto begin = sub_rays.begin(); begin != end && count < kMostEchoes; ++count) {
+    for (auto begin = sub_rays.begin(); begin != end && count < kMaxEchoes; ++count) {
         auto next = begin + 1;
         while (next != end && next->range_m - (next - 1)->range_m <= gap_m) ++next;
         echoes[count] = echo_of({begin, next}, begin->range_m, (next - 1)->range_m, n);
@@ -242,8 +243,8 @@ std::size_t LidarReceiver::part(std::span<LidarReturn> sub_rays, EchoList& echoe
     return count;
 }
 
-/// Light within a pulse's length of an echo is part of it. Of later light, the pulse's length with the most of it
-/// is an echo of its own. `late`: returns of one beam, of which each brings an equal share; its order is lost.
+/// Light within a pulse's length of an echo is added to it. Of later light, the interval of a pulse's length with
+/// the most of it is an echo of its own. `late`: returns of one beam, equally weighted; their order changes.
 /// Returns the number of echoes, the nearest first.
 std::size_t LidarReceiver::add_multipath(std::span<LidarReturn> late, EchoList& echoes,
                                          std::size_t n) const noexcept {
@@ -258,7 +259,7 @@ std::size_t LidarReceiver::add_multipath(std::span<LidarReturn> late, EchoList& 
         else
             add_light(r, rays, echoes[k - 1]);
     }
-    if (later == 0 || n == kMostEchoes) return n;
+    if (later == 0 || n == kMaxEchoes) return n;
     late = late.first(later);
     std::ranges::sort(late, {}, &LidarReturn::range_m);
     Echo strongest, window;
@@ -274,22 +275,22 @@ std::size_t LidarReceiver::add_multipath(std::span<LidarReturn> late, EchoList& 
     return n + 1;
 }
 
-/// None where the echo is not detected.
+/// Returns an empty echo if it is not detected.
 LidarEcho LidarReceiver::detect(const Echo& echo, double noise, std::size_t lane, std::size_t number,
                                 Draws& draws) const noexcept {
-    if (least_light_ > 0) {
-        const double detected = detection_probability(echo.light / (noise * least_light_), model_.detection_snr);
+    if (min_light_ > 0) {
+        const double detected = detection_probability(echo.light / (noise * min_light_), model_.detection_snr);
         if (detected < 1 && uniform(draws.of_echo(number).w3[lane]) >= detected) return {};
     }
     return measure(echo, noise, lane, number, draws);
 }
 
-/// Of an echo that is detected; none where it is out of range.
+/// Measures a detected echo; returns an empty one if it is out of range.
 LidarEcho LidarReceiver::measure(const Echo& echo, double noise, std::size_t lane, std::size_t number,
                                  Draws& draws) const noexcept {
     LidarEcho out{echo.range_m, static_cast<float>(echo.light * echo.range_m * echo.range_m), echo.velocity_m_s};
-    // Of the threshold's strength over the echo's: 0 where there is no limit.
-    const double late = least_light_ > 0 ? noise * least_light_ / echo.light : 0;
+    // Strength of the threshold over that of the echo; 0 if there is no limit.
+    const double late = min_light_ > 0 ? noise * min_light_ / echo.light : 0;
     out.range_m += model_.range_bias_m + model_.range_walk_m * late;
     if (random_) {
         // Box and Muller 1958.

@@ -2,8 +2,8 @@
 ///
 /// A beam is a cone. One ray along its axis is wrong where it meets an edge, or a surface at more than 60 degrees
 /// of incidence, over which the footprint is spread by range * divergence * tan(incidence). Sub-rays sample the
-/// cone; their returns, sorted by range, part into echoes wherever the next is farther than a pulse is long. An
-/// echo is at the mean range of its light, rho / range^2 for each sub-ray.
+/// cone; their returns, sorted by range, are split into echoes wherever the next is farther than a pulse is long.
+/// An echo is at the mean range of its light, rho / range^2 for each sub-ray.
 ///
 /// The strength x of an echo is its light in units of the least that is detected in the dark, that of a diffuse
 /// surface of 10 % at LidarReceiverModel::range_at_10_percent_m. Sunlight raises the noise, and the threshold with
@@ -31,36 +31,36 @@ namespace narpa {
 
 class LidarReceiver {
 public:
-    /// More echoes of one shot than these, the nearest ones, are lost.
-    static constexpr std::size_t kMostEchoes = 4;
+    /// Most echoes of one shot; farther ones are lost.
+    static constexpr std::size_t kMaxEchoes = 4;
 
-    /// `seed`: the scene's; `index`: of the LiDAR, so that they differ. The tracer must outlive it. Allocates here
-    /// alone.
+    /// `seed`: the scene's; `index`: of the LiDAR, so that LiDARs have different noise. The tracer must outlive it.
+    /// Allocates only here.
     LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint64_t seed, std::size_t index);
 
-    /// Dims what comes back, sends some back itself, and scatters sunlight into the beams; null, as at first: a
-    /// vacuum. It must outlive this.
+    /// The medium dims the returns, scatters light of the pulses back, and scatters sunlight into the beams; null,
+    /// the default: a vacuum. It must outlive this.
     void set_medium(const Medium* medium) noexcept {
         medium_ = medium;
         bright_air_ = medium != nullptr && sunlight_ && tracer_.scene().sun.has_value();
-        air_ = AirEcho(model_, least_light_, medium);
+        air_ = AirEcho(model_, min_light_, medium);
     }
 
-    /// A batch of shots along the axes `beams`, numbered from `first` on: the numbers alone decide on their random
-    /// draws. `motions`: of all bodies, for velocities; empty: they are 0. Returns a bit for each shot of which
-    /// something may come back, and writes the echoes of these alone: range with bias and noise, before a packet's
-    /// rounding; the reflectivity that the light stands for at that range, which is less where only a part of the
-    /// beam is met.
+    /// Measures a batch of shots along the axes `beams`, numbered from `first` on: the random draws depend on the
+    /// numbers alone. `motions`: of all bodies, for velocities; empty: velocities are 0. Returns a bit for each
+    /// shot that may have a return, and writes the echoes of these alone: range with bias and noise, before a
+    /// packet's rounding; the reflectivity equivalent to the light at that range, which is less if only a part of
+    /// the beam hits the surface.
     std::uint32_t receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
                           std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept;
 
 private:
-    /// Light and range of what is one echo; from the nearest to the farthest that is part of it.
+    /// Light and range of one echo, and the ranges of its nearest and farthest return.
     struct Echo {
         double light = 0, range_m = 0, velocity_m_s = 0;
         double first_m = 0, last_m = 0;
     };
-    using EchoList = std::array<Echo, kMostEchoes>;
+    using EchoList = std::array<Echo, kMaxEchoes>;
     class Draws;
 
     /// `first`: number of the first beam.
@@ -87,10 +87,10 @@ private:
     double range_max_m_;
     double shot_range_max_m_;  ///< beyond `range_max_m_` where ranges wrap
     int mount_;
-    bool sunlight_;            ///< is wanted
+    bool sunlight_;            ///< is computed
     bool reports_sunlight_;    ///< also where there is no echo
-    bool bright_air_ = false;  ///< scatters sunlight that is wanted
-    double least_light_;       ///< rho / range^2; 0: all is detected
+    bool bright_air_ = false;  ///< the medium scatters sunlight, which is computed
+    double min_light_;         ///< rho / range^2; 0: all is detected
     bool random_;
     PhiloxSchedule schedule_;
     std::uint32_t stream_;

@@ -15,7 +15,7 @@
 namespace narpa {
 namespace {
 
-/// From mirror to mirror; a beam that meets more does not come back.
+/// Most mirrors of a path; a beam that meets more has no return.
 constexpr int kMirrors = 8;
 
 double mean(const Rgb& c) {
@@ -44,8 +44,8 @@ float sunlight_on(const Tracer& tracer, const BodyPoses& at, const Hit& hit, con
                                                                   std::numeric_limits<double>::infinity()));
 }
 
-/// As surface_at, of a lane. Most surfaces have no more than a picture of their colour: for these nothing else of
-/// the hit is read.
+/// Same as surface_at, for a lane. Most surfaces have at most a colour texture; for these the rest of the hit is
+/// not read.
 Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i,
                    const Vec3& direction) {
     const Scene& scene = tracer.scene();
@@ -64,8 +64,9 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
     return s;
 }
 
-/// Asks memory for the four texels of a lookup. Where coordinates leave the image it may ask for others: no matter.
-/// These two are always inlined, as GCC takes a function that does nothing else for one without effect.
+/// Prefetches the four texels of a lookup. Coordinates outside the image may prefetch other texels, which does no
+/// harm. These two functions are always inlined, as GCC regards a function that only prefetches as one without
+/// effect.
 [[gnu::always_inline]] inline void prefetch_texels(const Texture& t, float u, float v) {
     if (t.rgb.empty() || !std::isfinite(u) || !std::isfinite(v)) return;
     const auto first_at = [](float place, int n) {
@@ -79,7 +80,7 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
     if (row + 1 < static_cast<std::size_t>(t.height)) __builtin_prefetch(&t.rgb[3 * ((row + 1) * width + column)]);
 }
 
-/// The texels of all lanes are on their way before the first is looked up: else each lookup waits for its own.
+/// Prefetches the texels of all lanes before the first lookup, so that the memory latencies overlap.
 [[gnu::always_inline]] inline void prefetch_textures(const Scene& scene, const HitBatch& hits,
                                                      std::uint32_t lanes) {
     for (std::uint32_t rest = lanes; rest != 0; rest &= rest - 1) {
@@ -89,7 +90,7 @@ Surface surface_of(const Tracer& tracer, const BodyPoses& at, const HitBatch& hi
     }
 }
 
-/// What the shot meets at the end of its path. In place: a copy of what was just written in parts is slow.
+/// Fills in the return at the end of a path. In place, as copying a struct that was just written in parts is slow.
 void put_return(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits, std::size_t i, const Path& path,
                 const ShotSettings& settings, LidarReturn& r) {
     const Vec3 back = -path.direction;
@@ -107,7 +108,7 @@ void put_return(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits,
             static_cast<float>(path.one_way) * sunlight_on(tracer, at, hits[i], surface, back, settings.medium);
 }
 
-/// By the air on the piece of the path that ends in the hit, there and back.
+/// Attenuates the path by the medium on the segment that ends at the hit, both ways.
 void dim(Path& path, const BodyPoses& at, const Vec3& from, const HitBatch& hits, std::size_t i,
          const Medium& medium) {
     const double passes =
@@ -116,9 +117,9 @@ void dim(Path& path, const BodyPoses& at, const Vec3& from, const HitBatch& hits
     path.one_way *= passes;
 }
 
-/// Takes the hit as the end of a piece of the path.
+/// Extends the path to the hit.
 void advance(Path& path, const BodyPoses& at, const HitBatch& hits, std::size_t i, const ShotSettings& settings) {
-    // From a mirror on: rays leave it a little above, so that it does not meet itself.
+    // After a mirror, ranges of hits are measured from an offset start, so the distance between the points is used.
     const Vec3 position = hits.position[i];
     path.range_m += path.range_m > 0 ? norm(position - path.start) : hits.range_m[i];
     path.start = position;
@@ -160,7 +161,7 @@ void reflect(Path& path, const Tracer& tracer, const HitBatch& hits, std::size_t
     path.one_way *= mean(m.specular);
 }
 
-/// The shots whose first hits are mirrors. `hits`: those.
+/// Follows the shots whose first hits are mirrors. `hits`: the first hits.
 void follow_mirrors(const Tracer& tracer, const BodyPoses& at, const RayBatch& beams, const ShotSettings& settings,
                     std::uint32_t mirrored, HitBatch hits, std::span<LidarReturn> returns) {
     Lanes<Path> paths;

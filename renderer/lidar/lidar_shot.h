@@ -1,4 +1,4 @@
-/// renderer/lidar/lidar_shot.h - shots of a LiDAR or any other range finder, and what they meet.
+/// renderer/lidar/lidar_shot.h - shots of a LiDAR or any other range finder, and their returns.
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@ struct LidarReturn {
     float reflectivity = 0;   ///< seen along the beam: pi * BRDF(-d, -d) * cos(incidence), mean of bands, and the
                               ///< retroreflectance * cos(incidence)
     int body = -1;            ///< the last on the path
-    float cos_incidence = 0;  ///< there
+    float cos_incidence = 0;  ///< at that hit
     double velocity_m_s = 0;  ///< of the material point along the line of sight; receding is positive
-    float sunlight = 0;       ///< radiance of the surface towards the LiDAR, of a white one that faces the Sun
+    float sunlight = 0;  ///< radiance of the surface towards the LiDAR, relative to a white one that faces the Sun
 };
 
-/// What is wanted of shots beside range, reflectivity and body.
+/// What is computed for shots besides range, reflectivity and body, and its inputs.
 struct ShotSettings {
     double range_max_m = 0;      ///< no return from beyond
     bool multipath = false;      ///< a beam goes on from mirrors; else it ends there with a reflectivity of 0
@@ -31,7 +31,7 @@ struct ShotSettings {
     const Medium* medium = nullptr;           ///< dims the light on its way there and back; null: a vacuum
 };
 
-/// Of a body's material point, world; of body -1: 0. With settings.motions.
+/// Velocity of a material point of a body by settings.motions, world; 0 for body -1.
 [[nodiscard]] Vec3 velocity_at(const ShotSettings& settings, const BodyPoses& at, int body, const Vec3& point,
                                double time) noexcept;
 

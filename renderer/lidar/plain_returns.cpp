@@ -17,7 +17,7 @@ struct alignas(64) PlainSurfaces {
     RgbLanes diffuse, specular;
     Lanes<float> exponent, retroreflectance;
     std::uint32_t lanes = 0;  ///< those that are set
-    bool shiny = false;       ///< one of them has a lobe
+    bool shiny = false;       ///< one of them has a specular lobe
 
     void put(std::size_t i, const Material& m, const Rgb& m_specular) {
         diffuse.put(i, m.diffuse), specular.put(i, m_specular);
@@ -60,9 +60,9 @@ void gather_plain(const Tracer& tracer, const HitBatch& hits, std::uint32_t met,
     }
 }
 
-/// pi * BRDF * cosine for light that goes back where it came from (bsdf.h), to the last bit as bsdf() has it.
-NARPA_EACH_ISA void send_back(const PlainSurfaces& surfaces, const Vec3Lanes& normal, const Vec3Lanes& direction,
-                              PlainReturns& __restrict out) noexcept {
+/// pi * BRDF * cosine for light that returns along the incident ray; bit for bit equal to bsdf() (bsdf.h).
+NARPA_EACH_ISA void evaluate_backscatter(const PlainSurfaces& surfaces, const Vec3Lanes& normal,
+                                         const Vec3Lanes& direction, PlainReturns& __restrict out) noexcept {
     constexpr float inv_pi = static_cast<float>(std::numbers::inv_pi);
     Lanes<double> cosine, r_v;
     Lanes<float> lobe{};
@@ -96,7 +96,7 @@ void find_plain_returns(const Tracer& tracer, const RayBatch& rays, const HitBat
     PlainSurfaces surfaces;
     gather_plain(tracer, hits, met, surfaces);
     out.lanes = surfaces.lanes;
-    if (out.lanes != 0) send_back(surfaces, hits.shading_normal, rays.direction, out);
+    if (out.lanes != 0) evaluate_backscatter(surfaces, hits.shading_normal, rays.direction, out);
 }
 
 }  // namespace narpa

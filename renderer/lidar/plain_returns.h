@@ -1,5 +1,5 @@
-/// renderer/lidar/plain_returns.h - what Lambert's and Phong's surfaces send back along the rays that meet them,
-/// sixteen side by side.
+/// renderer/lidar/plain_returns.h - reflectivity of Lambert and Phong surfaces back along the incident rays,
+/// sixteen at a time.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace narpa {
 
-/// As LidarReturn has them.
+/// The members of LidarReturn with these names, for sixteen rays.
 struct alignas(64) PlainReturns {
     std::uint32_t lanes = 0;  ///< those that are set
     Lanes<float> reflectivity, cos_incidence;
 };
 
-/// Of those lanes of `met` whose surface is of Lambert or Phong and has no texture but of its colour.
+/// Evaluates those lanes of `met` whose material is Lambert or Phong and has no texture but that of its colour.
 void find_plain_returns(const Tracer& tracer, const RayBatch& rays, const HitBatch& hits, std::uint32_t met,
                         PlainReturns& out) noexcept;
 

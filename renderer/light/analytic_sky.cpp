@@ -42,7 +42,7 @@ AnalyticSkyBackground::AnalyticSkyBackground(const Scene& scene)
         for (std::size_t j = 0; j < kColumns; ++j) {
             const Rgb light = sky(direction_at(r, z, (static_cast<double>(j) + 0.5) / kColumns));
             horizontal += static_cast<float>(z * kCell) * light;
-            // A floor, so that no direction has no density.
+            // A small floor keeps the density positive in every direction.
             density_[i * kColumns + j] =
                 static_cast<double>(mean_band(light)) + 1e-9 * static_cast<double>(irradiance_);
             row += density_[i * kColumns + j];

@@ -1,5 +1,5 @@
 /// renderer/light/analytic_sky.h - Hosek and Wilkie's sky (renderer/atmosphere/hosek_wilkie.h) as a background and
-/// a light, over flat ground; and the air that dims the Sun in it.
+/// a light, over flat ground; and the air that attenuates the Sun in it.
 #pragma once
 
 #include <vector>
@@ -12,8 +12,8 @@
 
 namespace narpa {
 
-/// Below the horizon stands ground of the sky's albedo, evenly lit by sky and Sun. Sampled in proportion to a table
-/// of its radiance over 64 x 128 cells of equal solid angle.
+/// Below the horizon is ground of the sky's albedo, uniformly lit by sky and Sun. Importance-sampled by a table of
+/// its radiance over 64 x 128 cells of equal solid angle.
 class AnalyticSkyBackground final : public Background {
 public:
     /// `scene` has a sky and a Sun.
@@ -23,7 +23,7 @@ public:
     [[nodiscard]] bool is_sampled() const noexcept override { return true; }
     [[nodiscard]] BackgroundSample sample(double u, double v) const noexcept override;
     [[nodiscard]] double pdf(const Vec3& direction) const noexcept override;
-    /// Of a horizontal surface that the sky lights.
+    /// Irradiance of a horizontal surface by the sky, divided by pi.
     [[nodiscard]] Rgb ambient() const noexcept override { return ambient_; }
 
 private:
@@ -35,11 +35,11 @@ private:
     float irradiance_;
     Vec3 to_sun_;  ///< in the frame
     Rgb ground_{}, ambient_{};
-    std::vector<double> row_end_, column_end_;  ///< cumulative, of rows and in each row
+    std::vector<double> row_end_, column_end_;  ///< cumulative distributions of the rows, and within each row
     std::vector<double> density_;               ///< per solid angle, by cell
 };
 
-/// Sunlight comes through the air of the sky's turbidity; nothing else is dimmed.
+/// Attenuates direct sunlight by air of the sky's turbidity; nothing else is attenuated.
 class SunThroughAir final : public Medium {
 public:
     explicit SunThroughAir(const Scene& scene);
@@ -58,7 +58,7 @@ private:
     Rgb transmittance_;
 };
 
-/// Of sunlight on the ground, through the Earth's air of this turbidity.
+/// Transmittance of sunlight to the ground through the Earth's air of this turbidity.
 [[nodiscard]] Rgb sunlight_transmittance(double turbidity, double sun_elevation_rad);
 
 }  // namespace narpa

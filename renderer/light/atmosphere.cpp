@@ -10,8 +10,8 @@ namespace {
 
 /// Wavelength of the LiDARs' beams.
 constexpr double kLidar_m = 905e-9;
-/// Rays that start so near to each other start at one place, as a lens's do; places are rounded to this part of it,
-/// and directions of the Sun to this, so that they have cells in common (AirCells).
+/// Rays whose origins are this close (as on a lens) are treated as having one origin. Origins are rounded to
+/// kPlace_m and Sun directions to kSunDirection, so that they share cells (AirCache).
 constexpr double kOnePlace_m = 1, kPlace_m = 0.25, kSunDirection = 0x1p-20;
 
 Vec3 rounded(const Vec3& v, double step) {
@@ -24,7 +24,7 @@ AirResolution resolution_of(const Atmosphere& a) {
     return r;
 }
 
-/// The noise that it makes is a square root: 1 % of the light will do.
+/// An error of 1 % suffices: the light only adds shot noise, which goes with its square root.
 AirResolution lidar_resolution_of(const Atmosphere& a) {
     AirResolution r;
     r.steps = std::min(a.steps, 8);
@@ -79,14 +79,14 @@ MediumSegment AtmosphereMedium::along(const BodyPoses& at, const Ray& ray, doubl
 void AtmosphereMedium::along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                                   std::span<MediumSegment> segments) const noexcept {
     if (rays.empty()) return;
-    if (rays.size() > RayBundle::kMost) return Medium::along_each(at, rays, segments);
+    if (rays.size() > RayBundle::kMax) return Medium::along_each(at, rays, segments);
     double time = rays.front().ray.time;
     Frame frame = frame_at(at, time);
     const Vec3 origin = rounded(frame.point(rays.front().ray.origin), kPlace_m);
     std::optional<Vec3> sun = to_sun(frame);
     if (sun) sun = normalized(rounded(*sun, kSunDirection));
-    UninitializedArray<RayBundle::Ray, RayBundle::kMost> bundle;
-    UninitializedArray<AirLight, RayBundle::kMost> light;
+    UninitializedArray<RayBundle::Ray, RayBundle::kMax> bundle;
+    UninitializedArray<AirLight, RayBundle::kMax> light;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         const auto& [ray, range_m, u] = rays[i];
         if (ray.time != time) frame = frame_at(at, time = ray.time);
@@ -135,7 +135,7 @@ double AtmosphereMedium::lidar_in_scattering(const BodyPoses& at, const Ray& ray
     return sun_->irradiance_w_m2 * static_cast<double>(light.in_scattering.x);
 }
 
-/// Lengths are the world's: the ellipsoid's scale changes them by 0.3 %.
+/// Lengths are not rescaled: the ellipsoid's scale changes them by 0.3 %.
 Medium::Backscatter AtmosphereMedium::lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
                                                         double to_m) const noexcept {
     const Frame frame = frame_at(at, ray.time);

@@ -1,9 +1,10 @@
-/// renderer/light/atmosphere.h - a planet's air as a medium: it dims what is seen through it and the Sun, scatters
-/// sunlight towards the viewer (sky, aerial perspective, limb, twilight), and lights surfaces from all sides.
+/// renderer/light/atmosphere.h - a planet's air as a medium: it attenuates light, that of the Sun included,
+/// scatters sunlight towards the viewer (sky, aerial perspective, limb, twilight), and lights surfaces from all
+/// sides.
 ///
-/// An ellipsoid's air follows the ellipsoid: positions are scaled to a sphere of the same volume, which changes
-/// lengths by up to the flattening, 0.3 % of them for the Earth. Rays are straight: refraction is a matter of
-/// apparent places (renderer/atmosphere/refraction.h).
+/// An ellipsoid's air follows the ellipsoid: positions are scaled to a sphere of radius `ground_radius_m`, which
+/// changes lengths by up to the flattening, 0.3 % for the Earth. Rays are straight; refraction is handled for
+/// apparent positions (renderer/atmosphere/refraction.h).
 #pragma once
 
 #include <memory>
@@ -18,13 +19,13 @@ namespace narpa {
 
 class AtmosphereMedium final : public Medium {
 public:
-    /// `scene` has an atmosphere. Makes its tables, on so many threads (0: all).
+    /// `scene` has an atmosphere. Computes its tables on this many threads (0: all).
     AtmosphereMedium(const Scene& scene, int threads);
 
     [[nodiscard]] MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
                                       double u) const noexcept override;
     [[nodiscard]] bool uses_random_numbers() const noexcept override { return false; }
-    /// Camera rays from one place on the planet: by interpolation (renderer/atmosphere/ray_bundle.h).
+    /// Camera rays from one origin are interpolated (renderer/atmosphere/ray_bundle.h).
     void along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                     std::span<MediumSegment> segments) const noexcept override;
     [[nodiscard]] Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept override;
@@ -32,23 +33,23 @@ public:
                               double time) const noexcept override;
     [[nodiscard]] double lidar_transmittance(const BodyPoses& at, const Ray& ray,
                                              double range_m) const noexcept override;
-    /// Of scenes whose LiDARs see sunlight; else 0.
+    /// 0 unless a LiDAR of the scene sees sunlight.
     [[nodiscard]] double lidar_in_scattering(const BodyPoses& at, const Ray& ray, double range_m,
                                              double u) const noexcept override;
     [[nodiscard]] Backscatter lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
                                                 double to_m) const noexcept override;
-    [[nodiscard]] double most_lidar_backscatter_1_m() const noexcept override { return lidar_air_.most_1_m(); }
+    [[nodiscard]] double max_lidar_backscatter_1_m() const noexcept override { return lidar_air_.max_1_m(); }
     [[nodiscard]] int body() const noexcept override { return static_cast<int>(body_); }
 
 private:
-    /// From world to the planet's sphere.
+    /// Transforms world coordinates to the planet's sphere.
     struct Frame {
         Rigid3 T_world_planet;
         Vec3 scale;
         [[nodiscard]] Vec3 point(const Vec3& world) const {
             return scale * (conjugate(T_world_planet.q) * (world - T_world_planet.t));
         }
-        /// Not unit: its length is that of a metre.
+        /// Not unit: its length is the scaled length of one metre.
         [[nodiscard]] Vec3 direction(const Vec3& world) const {
             return scale * (conjugate(T_world_planet.q) * world);
         }
@@ -61,7 +62,7 @@ private:
     Vec3 scale_{1, 1, 1};
     std::optional<Sun> sun_;
     ScatteredLight light_;
-    std::unique_ptr<AirCells> cells_ = std::make_unique<AirCells>();  ///< what frames have integrated
+    std::unique_ptr<AirCache> cells_ = std::make_unique<AirCache>();  ///< cache shared by frames
     LidarAir lidar_air_;
     std::optional<ScatteredLight> lidar_light_;  ///< at the wavelength of LiDARs
 };

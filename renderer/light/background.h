@@ -1,7 +1,7 @@
-/// renderer/light/background.h - what escaped rays see: the radiance from beyond all bodies.
+/// renderer/light/background.h - radiance of escaped rays, from beyond all bodies.
 ///
-/// A new kind (a sky) is a class in files of its own, handed to RenderScene::create. The Sun's disc is no
-/// part of it (sun_disc.h). Units: W m^-2 sr^-1; directions are unit, in world axes, away from the viewer.
+/// A new kind (a sky) is a class in its own files, passed to RenderScene::create. The Sun's disc is separate
+/// (sun_disc.h). Units: W m^-2 sr^-1; directions are unit, in world axes, away from the viewer.
 #pragma once
 
 #include <optional>
@@ -22,21 +22,21 @@ public:
     virtual ~Background() = default;
 
     [[nodiscard]] virtual Rgb radiance(const Vec3& direction) const noexcept = 0;
-    /// The radiance, where it is the same in all directions: parts of the image that can show nothing else are then
+    /// The radiance, if it is the same in all directions: parts of the image that can show nothing else are then
     /// filled without tracing.
     [[nodiscard]] virtual std::optional<Rgb> uniform() const noexcept { return std::nullopt; }
 
-    /// Next-event estimation, for backgrounds with small bright parts; weighted against BSDF sampling by MIS. Not
-    /// sampled by default: then only escaped rays find the background.
+    /// True if `sample` serves next-event estimation, weighted against BSDF sampling by MIS; for backgrounds with
+    /// small bright parts. False by default: only escaped rays find the background.
     [[nodiscard]] virtual bool is_sampled() const noexcept { return false; }
     [[nodiscard]] virtual BackgroundSample sample(double /*u*/, double /*v*/) const noexcept { return {}; }
     /// Density per solid angle with which `sample` returns the direction.
     [[nodiscard]] virtual double pdf(const Vec3& /*direction*/) const noexcept { return 0; }
 
     // Method "direct", which traces no rays from surface to surface:
-    /// Radiance of an even light that all surfaces reflect, without shadows.
+    /// Radiance of uniform ambient light that all surfaces reflect, without shadows.
     [[nodiscard]] virtual Rgb ambient() const noexcept { return {}; }
-    /// What camera rays see that escape.
+    /// Radiance of escaped camera rays.
     [[nodiscard]] virtual Rgb direct_radiance(const Vec3& direction) const noexcept { return radiance(direction); }
 };
 

@@ -1,4 +1,5 @@
-/// renderer/light/concentric_disc.h - the unit square onto the unit disc, areas and neighbourhoods kept.
+/// renderer/light/concentric_disc.h - area-preserving map of the unit square onto the unit disc with low
+/// distortion.
 #pragma once
 
 #include <array>

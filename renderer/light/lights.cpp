@@ -11,7 +11,7 @@
 namespace narpa {
 namespace {
 
-/// Occluders so close to a light are taken for its mounting: relative to the size of both, for rounding in single
+/// Occluders this close to a light count as its mounting: relative to the size of both, for rounding in single
 /// precision, and to the distance, for rounding in double.
 constexpr double kTouching = 4e-6, kTouchingFarOff = 1e-15;
 
@@ -19,7 +19,7 @@ Rigid3 frame_of(const BodyPoses& at, int mount, double time) {
     return mount < 0 ? Rigid3{} : at.T_world_body_at(static_cast<std::size_t>(mount), time);
 }
 
-/// From the receiver to a point that stands `from_origin` (world's axes) from the origin of a frame.
+/// Vector from the receiver to a point at `from_origin` (world axes) from the origin of a frame.
 Vec3 vector_to(const Receiver& to, const Rigid3& T_world_frame, const Vec3& from_origin) {
     return (T_world_frame.t - to.anchor) + (from_origin - to.offset);
 }
@@ -32,7 +32,7 @@ bool has_extent(const Light& l) {
     return l.kind == Light::Kind::rectangle || l.kind == Light::Kind::disc;
 }
 
-/// Density per solid angle of a point that is chosen with this density per area of a surface.
+/// Converts a density per surface area to a density per solid angle.
 double per_solid_angle(double per_area, double range_m, double cosine) {
     return per_area * range_m * range_m / std::abs(cosine);
 }
@@ -146,7 +146,7 @@ std::optional<LightSample> Lights::sample(const BodyPoses& at, const Receiver& t
         s.body = chosen->body;
         s.direction = direction, s.face = face;
     }
-    if (!is_finite(s.direction)) return std::nullopt;  // the point itself
+    if (!is_finite(s.direction)) return std::nullopt;  // the receiver is at the light's position
     return s;
 }
 

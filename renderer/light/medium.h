@@ -1,7 +1,7 @@
-/// renderer/light/medium.h - what lies between surfaces: it absorbs, emits and scatters light along rays.
+/// renderer/light/medium.h - participating media: absorb, emit and scatter light along rays.
 ///
-/// A new kind (an atmosphere, a plume) is a class in files of its own, handed to RenderScene::create. A scene
-/// without one pays nothing.
+/// A new kind (an atmosphere, a plume) is a class in its own files, passed to RenderScene::create. A scene without
+/// one pays nothing.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace narpa {
 
-/// Of a segment of a ray.
+/// Effect of a medium along a segment of a ray.
 struct MediumSegment {
     Rgb transmittance{1, 1, 1};  ///< part of the radiance from its end that reaches its start
     Rgb in_scattering{};         ///< radiance that arises along it and reaches its start, W m^-2 sr^-1
@@ -29,15 +29,14 @@ class Medium {
 public:
     virtual ~Medium() = default;
 
-    /// From the ray's origin (world, metres) as far as range_m, which is infinite for escaped rays. `u` is a random
-    /// number in [0, 1) for media that estimate the integral from one point of the segment; its mean over u must be
-    /// the integral.
+    /// Along the ray from its origin (world, metres) to range_m, which is infinite for escaped rays. `u` is a
+    /// random number in [0, 1) for media that estimate the integral from one point of the segment; the mean over u
+    /// must be the integral.
     [[nodiscard]] virtual MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
                                               double u) const noexcept = 0;
     /// False: the integral is exact, and `u` is not used.
     [[nodiscard]] virtual bool uses_random_numbers() const noexcept { return true; }
-    /// The same of several rays that start side by side, as a tile's do: each by itself, unless a kind can do with
-    /// less.
+    /// The same for several rays with nearby origins, such as a tile's; by default one at a time.
     virtual void along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                             std::span<MediumSegment> segments) const noexcept {
         for (std::size_t i = 0; i < rays.size(); ++i)
@@ -45,13 +44,13 @@ public:
     }
     /// For shadow rays.
     [[nodiscard]] virtual Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept = 0;
-    /// Method "direct": radiance of an even light that a surface at this place reflects, beside
-    /// Background::ambient: what the medium scatters onto it.
+    /// Method "direct": radiance of ambient light at a surface from the medium's scattering, in addition to
+    /// Background::ambient.
     [[nodiscard]] virtual Rgb ambient(const BodyPoses& /*at*/, const Vec3& /*position*/, const Vec3& /*normal*/,
                                       double /*time*/) const noexcept {
         return {};
     }
-    /// One way, of a LiDAR's beam.
+    /// One-way transmittance of a LiDAR's beam.
     [[nodiscard]] virtual double lidar_transmittance(const BodyPoses& at, const Ray& ray,
                                                      double range_m) const noexcept {
         return static_cast<double>(mean_band(transmittance(at, ray, range_m)));
@@ -61,8 +60,8 @@ public:
                                                      double u) const noexcept {
         return static_cast<double>(mean_band(along(at, ray, range_m, u).in_scattering));
     }
-    /// What the medium itself sends back of a LiDAR's pulse from between two ranges, 0 < from_m < to_m: pi times
-    /// the integral of backscatter * transmittance^2 / range^2, so that a diffuse surface sends reflectivity *
+    /// Return of a LiDAR's pulse from the medium between two ranges, 0 < from_m < to_m: pi times the integral of
+    /// backscatter * transmittance^2 / range^2, in units in which a diffuse surface returns reflectivity *
     /// transmittance^2 / range^2; and its mean range.
     struct Backscatter {
         double light = 0, range_m = 0;
@@ -71,9 +70,9 @@ public:
                                                         double /*from_m*/, double /*to_m*/) const noexcept {
         return {};
     }
-    /// Pi times the largest backscatter anywhere, 1/m; 0: it sends nothing back.
-    [[nodiscard]] virtual double most_lidar_backscatter_1_m() const noexcept { return 0; }
-    /// The body that it moves with; -1: it is at rest.
+    /// Pi times the largest backscatter coefficient anywhere, 1/m; 0: no backscatter.
+    [[nodiscard]] virtual double max_lidar_backscatter_1_m() const noexcept { return 0; }
+    /// The body that the medium moves with; -1: it is at rest.
     [[nodiscard]] virtual int body() const noexcept { return -1; }
 };
 

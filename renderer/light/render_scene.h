@@ -1,6 +1,6 @@
-/// renderer/light/render_scene.h - what a frame is rendered from: the scene's geometry and its light.
+/// renderer/light/render_scene.h - geometry and light of a scene, prepared for rendering.
 ///
-/// Made once at start; frames differ in the poses of the bodies alone.
+/// Created once at start; only the poses of the bodies change between frames.
 #pragma once
 
 #include <memory>
@@ -16,9 +16,9 @@ namespace narpa {
 
 class RenderScene {
 public:
-    /// `scene` must outlive it. `threads` bounds the threads that build; 0 is all. `shapes` as in Tracer::create.
+    /// `scene` must outlive it. `threads` limits the threads that build; 0 is all. `shapes` as in Tracer::create.
     /// `background` null: the scene's sky, or its ambient radiance; `medium` null: its atmosphere, or a vacuum.
-    /// Errors: of Tracer::create; a light that rides on a body that is not there or has no size.
+    /// Errors: those of Tracer::create; a light whose mount is not a body of the scene, or that has no size.
     static Result<RenderScene> create(const Scene& scene, int threads = 0,
                                       const std::vector<std::shared_ptr<const Shape>>& shapes = {},
                                       std::unique_ptr<const Background> background = nullptr,

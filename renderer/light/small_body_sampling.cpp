@@ -7,21 +7,21 @@
 namespace narpa {
 namespace {
 
-/// Squared sine of a cone's half angle, which is the part of a Lambert surface's rays that find it overhead: the
-/// BSDF finds wider ones by itself.
+/// Squared sine of a cone's half angle, which is the fraction of a Lambert surface's rays that hit the body
+/// overhead: BSDF sampling suffices for wider ones.
 constexpr double kWide = 0.25;
-/// Bodies that fill less of the sky than this are not worth many rays.
+/// Bodies that fill less of the sky than this get fewer rays.
 constexpr double kNegligible = 1e-6;
-/// A shape that is not convex may fill so much of its own sky, and leaves at least this part of the rays: enough
-/// for its dark side, and little lost on the lit one.
-constexpr double kOwnShape = 0.25, kLeastOfMesh = 0.1;
+/// A non-convex shape is assumed to fill kOwnShape of its own sky; on it, small bodies weigh at least kMinOfMesh:
+/// enough for its dark side, with little loss on the lit one.
+constexpr double kOwnShape = 0.25, kMinOfMesh = 0.1;
 
-/// A body's bounding sphere in the sky of the receiver.
+/// Cone of a body's bounding sphere as seen from the receiver.
 struct Cone {
     Vec3 to_centre{};
     double distance2 = 0;
     double sine2 = 0;       ///< squared sine of the half angle, 1 from within the sphere
-    double importance = 0;  ///< roughly the part of a Lambert surface's rays that find it
+    double importance = 0;  ///< approximate fraction of a Lambert surface's rays that hit it
 
     [[nodiscard]] bool is_small() const { return importance > 0 && sine2 < kWide; }
     [[nodiscard]] double one_minus_cosine() const { return sine2 / (1 + std::sqrt(1 - sine2)); }
@@ -55,7 +55,7 @@ SmallBodySampling::SmallBodySampling(const Tracer& tracer, const BodyPoses& at, 
         (c.is_small() ? sum_ : wide) += c.importance;
     }
     if (!(sum_ > 0)) return;
-    const double part = std::max(sum_ / (sum_ + wide), meets_itself ? kLeastOfMesh : 0);
+    const double part = std::max(sum_ / (sum_ + wide), meets_itself ? kMinOfMesh : 0);
     share_ = 0.5 * part * std::min(1.0, sum_ / kNegligible);
 }
 

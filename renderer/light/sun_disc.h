@@ -1,5 +1,4 @@
-/// renderer/light/sun_disc.h - the Sun as a disc of even radiance: its centre, a point of it, what a ray sees of
-/// it.
+/// renderer/light/sun_disc.h - the Sun as a disc of uniform radiance.
 #pragma once
 
 #include <cmath>
@@ -21,22 +20,22 @@ public:
     /// Irradiance of a surface that faces the centre, W m^-2.
     [[nodiscard]] float irradiance() const { return irradiance_; }
 
-    /// Direction to a point of the disc, even in its projected area, for u, v in [0, 1).
+    /// Direction to a point of the disc, uniform in projected area, for u, v in [0, 1).
     [[nodiscard]] Vec3 sample(double u, double v) const {
         const double r = sin_half_angle_ * std::sqrt(u);
         return frame_.to_world(direction_at(r, std::sqrt(1 - r * r), v));
     }
 
-    /// A point source, which no ray meets.
+    /// True for a point source, which no ray hits.
     [[nodiscard]] bool is_point() const { return sin_half_angle_ < 1e-12; }
-    /// Density of `sample` per solid angle in a unit direction, 0 beside the disc. Not for a point source.
+    /// Density of `sample` per solid angle in a unit direction, 0 outside the disc. Not for a point source.
     [[nodiscard]] double pdf(const Vec3& direction) const {
         const double cosine = dot(direction, frame_.z);
         const Vec3 across = cross(direction, frame_.z);  // as long as the sine, without cancellation
         if (cosine <= 0 || !(dot(across, across) < sin_half_angle_ * sin_half_angle_)) return 0;
         return cosine / projected_solid_angle();
     }
-    /// The same all over the disc, W m^-2 sr^-1. Not for a point source.
+    /// Radiance of the disc, W m^-2 sr^-1. Not for a point source.
     [[nodiscard]] float radiance() const {
         return static_cast<float>(static_cast<double>(irradiance_) / projected_solid_angle());
     }

@@ -14,7 +14,7 @@ namespace {
 /// A side of cells: 2 i from pixel i to its right neighbour, 2 i + 1 to the pixel below.
 using Side = std::size_t;
 
-/// Which sides are continuous, as far as it was asked.
+/// Caches which sides are continuous; evaluated on demand.
 class Sides {
 public:
     Sides(const ScalarField& field, const IsContinuous& is_continuous)
@@ -115,7 +115,7 @@ ImagePoint crossing(const ScalarField& field, const Sides& sides, Side side, dou
     return side % 2 == 0 ? ImagePoint{x + t, y} : ImagePoint{x, y + t};
 }
 
-/// Joins the segments of one level, lines with ends first.
+/// Joins the segments of one level, open lines first.
 void join(const ScalarField& field, const Sides& sides, double level, std::vector<Segment> segments,
           std::vector<ContourLine>& out) {
     std::ranges::sort(segments, {}, &Segment::from);

@@ -35,16 +35,16 @@ struct ContourLine {
 using IsContinuous = std::function<bool(std::size_t, std::size_t)>;
 
 inline constexpr int kMaxContourLevels = 1000;
-/// Values so far below a level count as on it: three times the error of a range (tracer.h), so that a flat surface
-/// at a level has no lines of noise.
+/// Values at most this far below a level count as on it: three times the error of a range (tracer.h), so that noise
+/// on a flat surface at a level gives no lines.
 inline constexpr double kLevelTolerance = 1e-6;
 
 /// The multiples of `interval` from the lowest to the highest value. Errors: an interval that is not above 0; more
 /// than kMaxContourLevels.
 [[nodiscard]] Result<std::vector<double>> contour_levels(double lowest, double highest, double interval);
 
-/// The lines of all levels, which ascend. No line passes a cell with a corner without value or a side that is not
-/// continuous: lines end there, as at the border of the image.
+/// The lines of all `levels`, which must ascend. Lines end at cells that have a corner without a value or a side
+/// that is not continuous, and at the border of the image.
 [[nodiscard]] std::vector<ContourLine> contour_lines(const ScalarField& field, std::span<const double> levels,
                                                      const IsContinuous& is_continuous);
 

@@ -1,7 +1,7 @@
 /// renderer/map/surface_map.h - depth or height of the surface that a camera sees, pixel by pixel.
 ///
-/// A map is of one moment: shutter, lens and budget of the camera do not matter, its projection with distortion
-/// does.
+/// A map shows one instant. It uses the camera's projection with distortion, and ignores its shutter, lens and
+/// budget.
 #pragma once
 
 #include <vector>
@@ -33,29 +33,29 @@ struct SurfaceMap {
     /// the upper left. Independent of the scene's lights.
     std::vector<float> shade;
 
-    /// Bilinear between pixel centres; on a contour line that is linear along the side of the cell.
+    /// Bilinear between pixel centres, so linear along a side of a cell.
     [[nodiscard]] Vec3 position_at(const ImagePoint& p) const;
 };
 
 class SurfaceMapper {
 public:
-    /// All outlive it.
+    /// All arguments must outlive it.
     SurfaceMapper(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const Rigid3& T_world_camera,
                   const MapQuantity& quantity);
 
     /// At the pixel centres. Same result on any number of threads.
     [[nodiscard]] SurfaceMap map() const;
 
-    /// Whether one surface reaches from image point a to b, at most a pixel apart. It is an occlusion edge
-    /// otherwise: a step in range. The interval is halved eight times, each time keeping the half with the larger
-    /// difference of range. A step is what then, within 1/256 of it, is more than a quarter of the whole difference
-    /// and more than 0.1 times the width of a pixel at that range. So at the limb of a sphere, where the difference
-    /// falls with the root of the distance (to 1/16), surfaces are continuous, and where faces meet, up to 87
-    /// degrees of slope.
+    /// Whether one surface reaches from image point a to b, at most a pixel apart; otherwise there is an occlusion
+    /// edge between them, a step in range. The interval is halved eight times, each time keeping the half with the
+    /// larger difference of range. It has a step if the difference that is left, over 1/256 of the interval, is
+    /// more than a quarter of the whole difference and more than 0.1 times the width of a pixel at that range. So
+    /// surfaces count as continuous at the limb of a sphere, where the difference falls with the root of the
+    /// distance (to 1/16), and where faces meet, up to 87 degrees of slope.
     [[nodiscard]] bool is_continuous(const ImagePoint& a, const ImagePoint& b) const;
 
 private:
-    /// `body` < 0 where there is no surface of the quantity's body.
+    /// Hit::body < 0 where the quantity's body is not hit.
     [[nodiscard]] Hit hit_at(const ImagePoint& p) const;
 
     const Tracer& tracer_;

@@ -14,7 +14,8 @@ Rgb directional_albedo(const Surface& s, double mu, int steps) noexcept {
     Vec3 sum{};
     for (int i = 0; i < steps; ++i)
         for (int j = 0; j < steps; ++j) {
-            // f is even in the azimuth. Points dense towards the horizon and towards v, with the Jacobian of that.
+            // f is even in the azimuth. Points are dense towards the horizon and towards v; the Jacobian
+            // compensates.
             const double t = (i + 0.5) / steps, u = (j + 0.5) / steps;
             const Vec3 l = direction_at(t * t, 0.5 * u * u);
             sum += vec_cast<double>(bsdf(s, n, l, v)) * (4 * t * t * t * 2 * u);

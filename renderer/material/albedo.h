@@ -1,4 +1,4 @@
-/// renderer/material/albedo.h - how much of the light a surface sends back in all.
+/// renderer/material/albedo.h - total reflectance of a surface.
 #pragma once
 
 #include "renderer/material/bsdf.h"

@@ -11,7 +11,7 @@ namespace {
 constexpr float kInvPi = static_cast<float>(std::numbers::inv_pi);
 using Kind = Material::Kind;
 
-// Out of line, both: what Lambert has no need of costs it nothing, not even registers to save.
+// Both out of line, so that Lambert's branch does not even save registers for them.
 
 [[gnu::noinline]] Rgb phong_bsdf(const Surface& s, double r_v) noexcept {
     if (r_v <= 0) return s.diffuse * kInvPi;
@@ -83,7 +83,7 @@ BsdfSample sample_bsdf(const Surface& s, const Vec3& n, const Vec3& v, const std
     }
     sample.l = chosen_direction(s, n, v, u);
     sample.pdf = bsdf_pdf(s, n, sample.l, v);
-    if (sample.pdf > lobes::kLeastDensity)
+    if (sample.pdf > lobes::kMinDensity)
         sample.weight = bsdf(s, n, sample.l, v) * static_cast<float>(dot(n, sample.l) / sample.pdf);
     return sample;
 }
@@ -96,7 +96,7 @@ Rgb other_ambient_reflectance(const Surface& s) noexcept {
         case Kind::lommel_seeliger: return lobes::lommel_seeliger_mean_albedo(s);
         case Kind::lunar_lambert: return lobes::lunar_lambert_mean_albedo(s);
         case Kind::hapke: return lobes::hapke_mean_albedo(s);
-        default: return {1, 1, 1};  // clear glass sends on all it gets
+        default: return {1, 1, 1};  // clear glass loses no light
     }
 }
 

@@ -1,8 +1,8 @@
-/// renderer/material/bsdf.h - how a point of a surface sends light on.
+/// renderer/material/bsdf.h - scattering of light at a point of a surface.
 ///
-/// Directions are unit, in the world's frame, and point away from the surface: n is the shading normal, v goes to
-/// where the light is wanted (the viewer's side: n.v > 0 but for grazing shading normals), l to where it comes
-/// from. Everything is radiometric: f in 1/sr, no cosine in it. Parameters of each kind: Material in scene.h.
+/// Directions are unit, in world axes, and point away from the surface: n is the shading normal, v points to the
+/// viewer (n.v > 0 except for grazing shading normals), l to where the light comes from. All quantities are
+/// radiometric: f in 1/sr, without the cosine. Parameters of each kind: Material in material.h.
 ///
 /// kind             f(l, v); a: phase angle between l and v    l chosen by           keeps energy and is reciprocal
 /// lambert          kd / pi                                    cosine                for kd <= 1
@@ -26,22 +26,22 @@
 
 namespace narpa {
 
-/// A Surface without a material of its own is Phong by its own numbers (Lambert while specular is 0).
+/// Default material of a Surface: Phong with the Surface's own values (Lambert while specular is 0).
 inline const Material kPlainMaterial{.name = {}, .kind = Material::Kind::phong};
 
 /// A material at one point, its textures looked up.
 struct Surface {
-    Rgb diffuse{};   ///< kd, base colour, normal albedo or w, as the kind says
-    Rgb specular{};  ///< ks of phong; other kinds have theirs in the material
+    Rgb diffuse{};   ///< kd, base colour, normal albedo or w, depending on the kind
+    Rgb specular{};  ///< ks of phong; other kinds take it from the material
     Rgb emission{};
     float exponent = 1;                          ///< of phong
-    const Material* material = &kPlainMaterial;  ///< what does not vary over the surface; never null
+    const Material* material = &kPlainMaterial;  ///< parameters that do not vary over the surface; never null
     Vec3 normal{};                               ///< shading normal, unit, world, on the viewer's side
     bool outside = true;  ///< the viewer is on the outer side of the surface (for refraction)
 };
 
-/// Does the material reflect or refract in single directions only (mirror, dielectric)? Then f is 0 everywhere and
-/// light is found by `sample_bsdf` alone.
+/// True if the BSDF is a delta distribution (mirror, dielectric). Then f is 0 everywhere and only `sample_bsdf`
+/// finds light.
 [[nodiscard]] bool is_specular(const Material& m) noexcept;
 
 /// Reflected radiance per irradiance, 1/sr; 0 unless l and v both lie on the side of n, and 0 for specular kinds.
@@ -52,27 +52,26 @@ struct Surface {
 [[nodiscard]] double bsdf_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
 
 struct BsdfSample {
-    Vec3 l{};                  ///< where the path goes on
+    Vec3 l{};                  ///< next direction of the path
     Rgb weight{};              ///< f |n.l| / pdf; all zero: the path ends
     double pdf = 0;            ///< per solid angle; 0 where `specular`
     bool specular = false;     ///< a single direction: no light sampling can find it
-    bool transmitted = false;  ///< goes on at the other side of the surface
-    /// The part of `weight` that comes of radiance growing with the index squared, 1 unless `transmitted`; it
-    /// cancels when the light leaves the body, so Russian roulette does well to judge a path by its weights without
-    /// it.
+    bool transmitted = false;  ///< continues on the other side of the surface
+    /// The factor of `weight` from radiance scaling with the index squared, 1 unless `transmitted`. It cancels when
+    /// the light leaves the body, so Russian roulette should divide it out.
     float radiance_scale = 1;
 };
-/// Chooses l in proportion to f |n.l|, as far as the kind allows; u: three numbers in [0, 1), u[0] chooses the
+/// Samples l in proportion to f |n.l|, as far as the kind allows; u: three numbers in [0, 1), u[0] selects the
 /// lobe.
 [[nodiscard]] BsdfSample sample_bsdf(const Surface& s, const Vec3& n, const Vec3& v,
                                      const std::array<double, 3>& u) noexcept;
 
-/// What `ambient_reflectance` gives for the kinds after phong.
+/// `ambient_reflectance` for the kinds after phong.
 [[nodiscard]] Rgb other_ambient_reflectance(const Surface& s) noexcept;
 
-/// Radiance sent back under an even environment of radiance 1, averaged over the viewer's directions: what
-/// `[ambient]` is multiplied with in direct light. Phong's lobe counts as at normal incidence, where its albedo is
-/// exactly ks; phong_classic has its ka.
+/// Reflected radiance under a uniform environment of radiance 1, averaged over the viewer's directions: the factor
+/// of `[ambient]` in direct light. Phong's lobe counts as at normal incidence, where its albedo is exactly ks;
+/// phong_classic uses its ka.
 [[nodiscard]] inline Rgb ambient_reflectance(const Surface& s) noexcept {
     return s.material->kind <= Material::Kind::phong ? s.diffuse + s.specular : other_ambient_reflectance(s);
 }

@@ -1,4 +1,4 @@
-/// renderer/material/directions.h - choosing directions about an axis.
+/// renderer/material/directions.h - sampling of directions about an axis.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ struct Basis {
     }
 };
 
-/// At an angle from the z axis that is given by both, at the azimuth 2 pi u.
+/// Unit vector at the angle from the z axis with this sine and cosine, and the azimuth 2 pi u.
 [[nodiscard]] inline Vec3 direction_at(double sine, double cosine, double u) noexcept {
     const auto [sin, cos] = sincos_of_turns(u);
     return {sine * cos, sine * sin, cosine};
@@ -37,12 +37,13 @@ struct Basis {
     return direction_at(std::sqrt(std::max(0.0, 1 - cosine * cosine)), cosine, u);
 }
 
-/// Density cosine / pi about n.
+/// Samples a direction about n with density cosine / pi.
 [[nodiscard]] inline Vec3 cosine_direction(const Vec3& n, double u1, double u2) noexcept {
     return Basis(n).to_world(direction_at(std::sqrt(1 - u1), u2));
 }
 
-/// A direction below the surface is mirrored to above it: its light is not lost, and the densities of the two add.
+/// Mirrors a direction below the surface to above it: its light is not lost, and the densities of the two
+/// directions add.
 [[nodiscard]] inline Vec3 folded(const Vec3& l, const Vec3& n) noexcept {
     const double below = dot(n, l);
     return below < 0 ? l - 2 * below * n : l;

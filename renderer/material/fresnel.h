@@ -1,4 +1,4 @@
-/// renderer/material/fresnel.h - what a smooth interface between two transparent media does to a ray.
+/// renderer/material/fresnel.h - reflection and refraction at a smooth interface between two transparent media.
 ///
 /// Here `v` points towards the surface and `n` (unit) against it: v.n <= 0. The index `eta` is that of the far side
 /// over that of the side where v comes from. Source: M. Born, E. Wolf, "Principles of Optics", sections 1.5.2

@@ -1,6 +1,6 @@
-// Rough metal, or dielectric over a diffuse base: glTF 2.0's metallic-roughness material (appendix B) with what it
-// leaves out: masking that is correlated by height, light that bounces between the facets, and a base that gets
-// only the light which the interface lets through.
+// Rough metal, or dielectric over a diffuse base: glTF 2.0's metallic-roughness material (appendix B), extended by
+// height-correlated masking, multiple scattering between the facets, and a base that receives only the light that
+// the interface transmits.
 //
 // f = metallic (F D V + M) + (1 - metallic) (F D V + M + base (1 - A(l)) (1 - A(v)) / (pi (1 - mean A)))
 // D: Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007, eq. 33; V = G2 / (4 n.l
@@ -16,12 +16,13 @@
 namespace narpa::lobes {
 namespace {
 
-/// Smoother surfaces act as this one: a lobe of 20 arcsec, within what double and a mesh's float normals resolve.
-constexpr double kLeastRoughness = 0.01;
-/// Light between the facets is left out where it is less than this on average: it would come as few bright samples.
-constexpr double kLeastMultiple = 1e-3;
+/// Smoother surfaces are treated as this one: a lobe of 20 arcsec, the limit that double and a mesh's float normals
+/// resolve.
+constexpr double kMinRoughness = 0.01;
+/// Multiple scattering below this mean is ignored: it would only give rare bright samples.
+constexpr double kMinMultiple = 1e-3;
 
-/// What depends neither on l nor on v.
+/// Quantities that depend on neither l nor v.
 struct Ggx {
     double alpha, metallic;
     Rgb base;
@@ -38,13 +39,13 @@ struct Ggx {
           albedo(roughness),
           coat{std::clamp(static_cast<double>(s.material->ior), 1.0, 3.0), s.material->schlick} {
         const double mean = albedo.mean();
-        missing = 1 - mean < kLeastMultiple ? 0 : 1 - mean;
+        missing = 1 - mean < kMinMultiple ? 0 : 1 - mean;
         const double f = mean_fresnel(coat);
         multiple_diel = f * f * mean / (1 - f * (1 - mean));
         diffuse_missing = 1 - albedo.dielectric_mean(coat) - missing * multiple_diel;
     }
     explicit Ggx(const Surface& s) noexcept
-        : Ggx(s, std::clamp(static_cast<double>(s.material->roughness), kLeastRoughness, 1.0)) {}
+        : Ggx(s, std::clamp(static_cast<double>(s.material->roughness), kMinRoughness, 1.0)) {}
 
     [[nodiscard]] Rgb multiple_metal() const noexcept {
         const float mean = static_cast<float>(albedo.mean());
@@ -52,9 +53,9 @@ struct Ggx {
         return {f.x * f.x * mean / (1 - f.x * (1 - mean)), f.y * f.y * mean / (1 - f.y * (1 - mean)),
                 f.z * f.z * mean / (1 - f.z * (1 - mean))};
     }
-    /// Share of light from mu that the facets send out after more than one bounce, if they were perfect mirrors.
+    /// Share of light from mu that leaves the facets after more than one bounce, if they were perfect mirrors.
     [[nodiscard]] double unseen(double mu) const noexcept { return missing > 0 ? 1 - albedo.at(mu) : 0; }
-    /// 1 - A: what gets through the interface to the base.
+    /// 1 - A: fraction that the interface transmits to the base.
     [[nodiscard]] double through(double mu) const noexcept {
         return std::max(0.0, 1 - albedo.dielectric(coat, mu) - unseen(mu) * multiple_diel);
     }
@@ -64,7 +65,7 @@ struct Ggx {
     }
 };
 
-/// D of the half vector h (unit), by the sine so that narrow lobes keep their digits.
+/// D of the half vector h (unit), computed from the sine to keep precision in narrow lobes.
 double distribution(double alpha, const Vec3& n, const Vec3& h) {
     const Vec3 c = cross(n, h);
     const double cosine = dot(n, h), t = dot(c, c) + alpha * alpha * cosine * cosine;
@@ -75,12 +76,12 @@ double spread(double alpha, double mu) {
     return std::sqrt(alpha * alpha + (1 - alpha * alpha) * mu * mu);
 }
 
-/// The material seen from one side.
+/// The material seen from the direction v.
 struct SeenGgx : Ggx {
     Vec3 n, v;
     double n_v, spread_v, unseen_v, through_v = 0;
     Rgb metal_later{};  ///< Fresnel factor of light that bounced more than once
-    double share;       ///< of the samples that the first bounce takes
+    double share;       ///< share of the samples for the first bounce
 
     SeenGgx(const Surface& s, const Vec3& normal, const Vec3& view) noexcept
         : Ggx(s), n(normal), v(view), n_v(dot(n, v)), spread_v(spread(alpha, n_v)), unseen_v(unseen(n_v)) {
@@ -123,7 +124,7 @@ struct SeenGgx : Ggx {
         return f;
     }
 
-    /// The density of the mirror directions about visible normals is that of the normals over 4 h.v.
+    /// Density of mirror directions about visible normals: that of the normals divided by 4 h.v.
     [[nodiscard]] double pdf(const Vec3& l) const noexcept {
         const Vec3 sum = l + v;
         const double length = norm(sum);
@@ -160,7 +161,7 @@ BsdfSample ggx_sample(const Surface& s, const Vec3& n, const Vec3& v, const Rand
     const double n_l = dot(n, sample.l);
     if (n_l <= 0) return sample;
     sample.pdf = g.pdf(sample.l);
-    if (sample.pdf > kLeastDensity) sample.weight = g.f(sample.l) * static_cast<float>(n_l / sample.pdf);
+    if (sample.pdf > kMinDensity) sample.weight = g.f(sample.l) * static_cast<float>(n_l / sample.pdf);
     return sample;
 }
 

@@ -1,9 +1,9 @@
-/// renderer/material/ggx_albedo.h - how much light a rough GGX surface sends back on the first bounce.
+/// renderer/material/ggx_albedo.h - albedo of a rough GGX surface for the first bounce.
 ///
-/// What is missing to 1 with F = 1 bounced between the facets; C. Kulla, A. Conty, "Revisiting Physically Based
-/// Shading at Imageworks" (SIGGRAPH 2017 course) give it back. Looked up in the tables of ggx_table.h, which assume
-/// Smith's height-correlated masking. They err upwards, by at most 0.006 (E) and 0.015 (with Fresnel's equations,
-/// grazing at roughness below 0.3): so the sum of all that is reflected never exceeds 1.
+/// With F = 1 the light missing to 1 is scattered several times between the facets; C. Kulla, A. Conty, "Revisiting
+/// Physically Based Shading at Imageworks" (SIGGRAPH 2017 course) restore it. Values come from the tables of
+/// ggx_table.h, which assume Smith's height-correlated masking. They err upwards, by at most 0.006 (E) and 0.015
+/// (with Fresnel's equations, grazing at roughness below 0.3), so that the total reflectance never exceeds 1.
 #pragma once
 
 #include "renderer/material/fresnel.h"
@@ -15,12 +15,12 @@ class GgxAlbedo {
 public:
     explicit GgxAlbedo(double roughness) noexcept;
 
-    /// Directional albedo E at cosine mu (0..1] where every facet reflects all.
+    /// Directional albedo E at cosine mu (0..1] for perfectly reflecting facets.
     [[nodiscard]] double at(double mu) const noexcept;
     /// Its cosine-weighted mean over the hemisphere.
     [[nodiscard]] double mean() const noexcept;
 
-    /// Fresnel of which interface: `ior` 1..3, exact or by Schlick's approximation.
+    /// The dielectric interface: `ior` 1..3, Fresnel's equations or Schlick's approximation.
     struct Interface {
         double ior = 1.5;
         bool schlick = false;
@@ -28,7 +28,7 @@ public:
     /// Directional albedo of the first bounce off a dielectric's facets, and its mean.
     [[nodiscard]] double dielectric(Interface i, double mu) const noexcept;
     [[nodiscard]] double dielectric_mean(Interface i) const noexcept;
-    /// Mean over the hemisphere of the first bounce's part that Schlick's (1 - cosine)^5 weighs.
+    /// Hemispherical mean of the first bounce weighted by Schlick's (1 - cosine)^5.
     [[nodiscard]] double mean_schlick_power() const noexcept;
 
 private:

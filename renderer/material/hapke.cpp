@@ -31,8 +31,8 @@ double chandrasekhar_h(double w, double mu) {
     return 1 / (1 - w * (r0 * mu + (0.5 - r0 * mu) * logarithm));
 }
 
-/// Cosines that the facets of a rough surface have on average where they are lit and seen, and what is left of the
-/// light; `shadowing` is S over n.l.
+/// Effective cosines of the lit and visible facets of a rough surface, and the remaining light: `shadowing` is S
+/// over n.l.
 struct RoughGeometry {
     double mu_l, mu_v, shadowing;
 };
@@ -55,7 +55,7 @@ RoughGeometry rough_geometry(double roughness_rad, double n_l, double n_v, doubl
     const double cos_psi = product > 0 ? std::clamp((l_v - l.mu * v.mu) / product, -1.0, 1.0) : 1;
     const double psi = std::acos(cos_psi), sin2_half = 0.5 * (1 - cos_psi);
 
-    // The steeper of the two rays decides which facets the other one shares with it.
+    // The formulas differ by which of the two directions is nearer to the normal.
     const bool light_higher = l.mu >= v.mu;
     const Slope &high = light_higher ? l : v, &low = light_higher ? v : l;
     const double normaliser = 2 - low.e1 - psi / kPi * high.e1;
@@ -70,7 +70,7 @@ RoughGeometry rough_geometry(double roughness_rad, double n_l, double n_v, doubl
     return {mu_l, mu_v, shadowing};
 }
 
-/// Share of the samples that go by the cosine: about that of light which was scattered more than once.
+/// Share of cosine-distributed samples: about that of multiply scattered light.
 double multiple_share(const Surface& s) {
     return 0.15 + 0.6 * std::clamp(mean(s.diffuse), 0.0, 1.0);
 }
@@ -110,9 +110,9 @@ Vec3 hapke_direction(const Surface& s, const Vec3& n, const Vec3& v, const Rando
     return folded(Basis(v).to_world(direction_at(cosine, u[2])), n);
 }
 
-// Single scattering as a Lommel-Seeliger sphere's; the rest as isotropic grains leave it (Hapke 2012, chapter 11,
-// within 0.3 per cent). Leaves out the narrow opposition peak, and what roughness hides: an upper bound but for
-// that peak.
+// Single scattering: that of a Lommel-Seeliger sphere. Multiple scattering: that of isotropic scatterers (Hapke
+// 2012, chapter 11, within 0.3 per cent). The narrow opposition peak and shadowing by roughness are left out: an
+// upper bound except for that peak.
 Rgb hapke_mean_albedo(const Surface& s) noexcept {
     const Hapke& h = s.material->hapke;
     const double b = static_cast<double>(h.phase_b), c = static_cast<double>(h.phase_c);

@@ -1,8 +1,8 @@
-/// renderer/material/lobes.h - the kinds of material one by one: what bsdf.cpp chooses among.
+/// renderer/material/lobes.h - the BSDF of each kind of material; bsdf.cpp selects among them.
 ///
-/// Each kind has its f in 1/sr (`_f`), the density of the directions it chooses (`_pdf`, 1/sr) and that choice
+/// Each kind has its f in 1/sr (`_f`), the sampling density of directions (`_pdf`, 1/sr) and the sampling itself
 /// (`_direction`, which may fall below the surface: then f is 0). All assume n.v > 0, the first two n.l > 0 as
-/// well. Phong's f stands in bsdf.cpp itself.
+/// well. Phong's f is in bsdf.cpp.
 #pragma once
 
 #include "base/constants.h"
@@ -11,10 +11,10 @@
 namespace narpa::lobes {
 
 using Random3 = std::array<double, 3>;
-/// Directions of less density are never drawn but by rounding, and could overflow the weight.
-inline constexpr double kLeastDensity = 1e-30;
+/// Lower densities occur only by rounding, and could overflow the weight.
+inline constexpr double kMinDensity = 1e-30;
 
-/// Of the bands.
+/// Mean of the bands.
 inline double mean(const Rgb& c) noexcept {
     return static_cast<double>(c.x + c.y + c.z) / 3;
 }

@@ -9,8 +9,8 @@
 
 namespace narpa {
 
-/// Image in linear light, 16 bits a band (65535 = 1.0), rows from the top; with the same picture at half, a quarter
-/// ... of the size, each texel the mean of what it covers, down to 1 x 1: what a distant surface is looked up in.
+/// Image in linear light, 16 bits per band (65535 = 1.0), rows from the top; with a mip map: the image at half, a
+/// quarter ... of the size, down to 1 x 1, each texel the mean of the area that it covers.
 struct Texture {
     enum class Wrap : std::uint8_t { repeat, clamp };
     struct Level {
@@ -21,7 +21,7 @@ struct Texture {
     int width = 0, height = 0;
     std::vector<std::uint16_t> rgb;  ///< 3 * width * height
     Wrap wrap = Wrap::repeat;
-    std::vector<Level> coarser{};  ///< empty: filtered from the finest alone
+    std::vector<Level> coarser{};  ///< mip levels; empty: only the finest level is used
 };
 
 /// Parameters of B. Hapke's model (Theory of Reflectance and Emittance Spectroscopy, 2nd ed. 2012) beside the
@@ -32,8 +32,8 @@ struct Hapke {
     float roughness_rad = 0;                        ///< macroscopic mean slope, theta-bar
 };
 
-/// How a surface sends light on. Directions and forms: renderer/material/bsdf.h. What a kind does not name it does
-/// not use.
+/// How a surface scatters light. Directions and forms: renderer/material/bsdf.h. Each kind uses only the parameters
+/// listed with it.
 struct Material {
     enum class Kind : std::uint8_t {
         lambert,          ///< diffuse
@@ -48,10 +48,10 @@ struct Material {
     };
     std::string name;
     Kind kind = Kind::lambert;
-    Rgb diffuse{0.5f, 0.5f, 0.5f};  ///< kd, or what the kind says
+    Rgb diffuse{0.5f, 0.5f, 0.5f};  ///< kd, or as listed with the kind
     Rgb specular{};                 ///< ks
     float exponent = 1;             ///< n of Phong's lobe
-    Rgb emission{};                 ///< radiance that the surface sends out by itself, W m^-2 sr^-1
+    Rgb emission{};                 ///< emitted radiance, W m^-2 sr^-1
     Rgb ambient{};                  ///< ka
     float roughness = 0.5f;         ///< perceptual: GGX alpha = roughness^2
     float metallic = 0;             ///< 0 dielectric over Lambert, 1 metal
@@ -61,17 +61,17 @@ struct Material {
     Hapke hapke{};
     int texture = -1;           ///< index into Scene::textures: multiplies `diffuse`; -1 is none
     int emission_texture = -1;  ///< multiplies `emission`
-    int specular_texture = -1;  ///< multiplies `specular`: of an ocean that glints, not of its land
-    int cloud_texture = -1;     ///< share of the surface that white diffuse clouds hide, close above it
+    int specular_texture = -1;  ///< multiplies `specular`, e.g. for an ocean that glints beside land
+    int cloud_texture = -1;     ///< share of the surface covered by white diffuse clouds, close above it
     Rgb cloud_albedo{};
     int normal_texture = -1;  ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
     int height_texture = -1;  ///< bumps: height in metres = bump_height_m * mean of rgb
     float normal_scale = 1;
     float bump_height_m = 0;
-    float retroreflectance = 0;  ///< towards a LiDAR, beside what the kind reflects: times a white diffuse surface
+    float retroreflectance = 0;  ///< towards a LiDAR, added to the kind's; relative to a white diffuse surface
 };
 
-/// Textures beside that of `diffuse`.
+/// True if there are textures besides that of `diffuse`.
 [[nodiscard]] inline bool has_more_than_colour(const Material& m) noexcept {
     return m.emission_texture >= 0 || m.specular_texture >= 0 || m.cloud_texture >= 0 || m.normal_texture >= 0 ||
            m.height_texture >= 0;
@@ -79,7 +79,7 @@ struct Material {
 [[nodiscard]] inline bool is_textured(const Material& m) noexcept {
     return m.texture >= 0 || has_more_than_colour(m);
 }
-/// Does its emission differ from place to place?
+/// True if the emission varies over the surface.
 [[nodiscard]] inline bool has_emission_map(const Material& m) noexcept {
     return m.emission_texture >= 0 || m.cloud_texture >= 0;
 }

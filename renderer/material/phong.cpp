@@ -1,4 +1,4 @@
-// Phong's lobe: its directions as a BRDF (Lafortune and Willems 1994), and the paper's form, which is none.
+// Phong's lobe: sampling for the BRDF (Lafortune and Willems 1994), and the paper's form, which is not a BRDF.
 #include <cmath>
 
 #include "renderer/material/directions.h"
@@ -8,8 +8,8 @@
 namespace narpa::lobes {
 namespace {
 
-/// Share of the samples that the lobe takes: by the albedos, each at its largest. A wide lobe leaves more to the
-/// cosine, which keeps the largest weight below twice the mean down to n = 0.
+/// Share of the samples for the lobe: by the albedos, each at its largest. A wide lobe leaves more to the cosine,
+/// which keeps the largest weight below twice the mean down to n = 0.
 double lobe_share(const Surface& s) {
     const double d = mean(s.diffuse), l = mean(s.specular), n = static_cast<double>(s.exponent);
     return l > 0 ? l / (d + l) * n / (n + 1) : 0;
@@ -22,8 +22,8 @@ double lobe_density(double cosine, double exponent) {
 
 }  // namespace
 
-// What the lobe throws below the surface is mirrored back above it: no sample is lost, and the density of a
-// direction is the lobe's in it and in its mirror image.
+// Lobe directions below the surface are mirrored to above it: no sample is lost, and the density of a direction is
+// the sum of the lobe's there and in its mirror image.
 double phong_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept {
     const double n_l = dot(n, l), n_v = dot(n, v), share = lobe_share(s),
                  exponent = static_cast<double>(s.exponent);

@@ -14,15 +14,15 @@ double henyey_greenstein(double g, double cos_phase) noexcept {
     return (1 - g * g) / (d * std::sqrt(d));
 }
 
-// The inverse of the distribution, multiplied out: the usual form divides by g.
+// Inverse CDF, multiplied out because the usual form divides by g.
 double henyey_greenstein_cosine(double g, double u) noexcept {
     const double s = 2 * u - 1, d = 1 + g * s;
     const double cos_scattering = (s + g * (3 + s * s) / 2 + g * g * s + g * g * g * (s * s - 1) / 2) / (d * d);
     return std::clamp(-cos_scattering, -1.0, 1.0);
 }
 
-// The sphere's phase curve 1 - sin(a/2) tan(a/2) ln cot(a/4), as Legendre's series in cos a (coefficients by
-// quadrature), meets Henyey and Greenstein's, whose coefficients are (2 n + 1) (-g)^n.
+// Integral of the sphere's phase curve 1 - sin(a/2) tan(a/2) ln cot(a/4) times Henyey and Greenstein's function, by
+// their Legendre series in cos a: coefficients by quadrature for the first, (2 n + 1) (-g)^n for the second.
 double lommel_seeliger_bond_albedo(double g) noexcept {
     constexpr double kCoefficients[] = {0.20456855, 0.23177662, 0.03575057, 0.01225415, 0.00564312, 0.00306012,
                                         0.00184385, 0.00119633, 0.00082006, 0.00058652, 0.00043394, 0.00033003};
@@ -68,7 +68,7 @@ Rgb lunar_lambert_f(const Surface& s, double n_l, double n_v, double l_v) noexce
     return s.diffuse * static_cast<float>((2 * weight / (n_l + n_v) + 1 - weight) / kPi);
 }
 
-// Half as the Lommel-Seeliger part (even over the hemisphere), half as Lambert's.
+// Half uniform over the hemisphere (for the Lommel-Seeliger part), half as Lambert's.
 double lunar_lambert_pdf(const Vec3& n, const Vec3& l) noexcept {
     return 0.25 / kPi + 0.5 * dot(n, l) / kPi;
 }

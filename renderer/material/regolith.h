@@ -1,7 +1,7 @@
-/// renderer/material/regolith.h - soils of airless bodies: their phase functions.
+/// renderer/material/regolith.h - phase functions of the soils of airless bodies.
 ///
-/// Everything is written in the phase angle a, between the directions to the light and to the viewer: a = 0 is full
-/// phase, the scattering angle is pi - a.
+/// All functions use the phase angle a, between the directions to the light and to the viewer: a = 0 is full phase,
+/// the scattering angle is pi - a.
 #pragma once
 
 #include "renderer/material/material.h"

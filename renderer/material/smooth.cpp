@@ -1,4 +1,4 @@
-// Mirror and clear dielectric: light that goes on in single directions.
+// Mirror and clear dielectric: delta distributions.
 #include "renderer/material/fresnel.h"
 #include "renderer/material/lobes.h"
 
@@ -12,8 +12,8 @@ BsdfSample mirror_sample(const Surface& s, const Vec3& n, const Vec3& v) noexcep
     return sample;
 }
 
-// Radiance over n^2 is what refraction keeps (E. Veach 1997, section 5.2): towards the viewer's side it is
-// multiplied with (n_viewer / n_beyond)^2, which entering and leaving a body cancels.
+// Refraction preserves radiance / n^2 (E. Veach 1997, section 5.2): towards the viewer's side the radiance is
+// multiplied by (n_viewer / n_beyond)^2, which cancels between entering and leaving a body.
 BsdfSample dielectric_sample(const Surface& s, const Vec3& n, const Vec3& v, double choice) noexcept {
     const Material& m = *s.material;
     const double ior = static_cast<double>(m.ior), eta = s.outside ? ior : 1 / ior,

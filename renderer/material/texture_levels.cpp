@@ -5,23 +5,22 @@
 namespace narpa {
 namespace {
 
-/// The sums are whole numbers, at most 65535 * width * height, so that doubles hold them exactly up to this many
-/// texels.
-constexpr std::size_t kMostTexels = std::size_t{1} << 37;
+/// The sums are integers, at most 65535 * width * height, so doubles hold them exactly up to this number of texels.
+constexpr std::size_t kMaxTexels = std::size_t{1} << 37;
 
-/// A place along the finest level where one texel of a coarser level ends and the next begins: `whole` texels and
+/// Position along the finest level where one texel of a coarser level ends and the next begins: `whole` texels and
 /// `part` / n of the next one, where n is the number of coarse texels.
 struct Edge {
     std::size_t whole;
     double part;
 };
 
-/// Adds up one coarser level while the rows of the finest pass by.
+/// Accumulates one coarser level in a pass over the rows of the finest.
 struct Reducer {
     Texture::Level level;
     std::vector<Edge> edges;  ///< along x, width + 1 of them
-    std::vector<double> sum;  ///< of the row of texels under way, times width * height of this level
-    std::size_t row = 0;      ///< the row under way
+    std::vector<double> sum;  ///< of the current row of texels, times width * height of this level
+    std::size_t row = 0;      ///< the current row
 
     Reducer(int fine_width, int width, int height)
         : level{width, height, {}}, sum(3 * static_cast<std::size_t>(width), 0.0) {
@@ -60,7 +59,7 @@ void build_coarser_levels(Texture& texture) {
     texture.coarser.clear();
     if (texture.width <= 0 || texture.height <= 0) return;
     const auto width = static_cast<std::size_t>(texture.width), height = static_cast<std::size_t>(texture.height);
-    if (width > kMostTexels / height || texture.rgb.size() < 3 * width * height) return;
+    if (width > kMaxTexels / height || texture.rgb.size() < 3 * width * height) return;
 
     std::vector<Reducer> levels;
     for (int w = texture.width, h = texture.height; w > 1 || h > 1;) {
@@ -73,7 +72,8 @@ void build_coarser_levels(Texture& texture) {
         const std::uint16_t* row = texture.rgb.data() + 3 * width * y;
         for (std::size_t i = 0; i < 3 * width; ++i) below[i + 3] = below[i] + row[i];
         for (Reducer& l : levels) {
-            // In parts of a texel of the finest, `rows` to each: this row ends here, the coarse row there.
+            // In units of 1 / `rows` of a texel of the finest level: `here`, end of this row; `there`, end of the
+            // coarse row.
             const auto rows = static_cast<std::size_t>(l.level.height);
             const std::size_t here = (y + 1) * rows, there = (l.row + 1) * height;
             const std::size_t over = here > there ? here - there : 0;

@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-constexpr int kMostTaps = 15;
+constexpr int kMaxTaps = 15;
 constexpr float kFullScale = 1.0f / 65535.0f;
 
 struct Image {
@@ -38,7 +38,7 @@ inline double into_unit(double x, bool repeat) {
     return repeat ? x - std::floor(x) : std::clamp(x, 0.0, 1.0);
 }
 
-/// The two texels about a place in [0, 1], and how far it is from the first to the second.
+/// The two texels around a position in [0, 1], and the fraction of the way from the first to the second.
 struct Between {
     int first, second;
     float part;
@@ -53,7 +53,7 @@ inline Between between(double place, int n, bool repeat) {
     return {first, second, part};
 }
 
-/// Three bands and an unused fourth number: what one instruction works on.
+/// Three bands and an unused fourth element: one SIMD register.
 using Bands [[gnu::vector_size(16)]] = float;
 using Codes [[gnu::vector_size(16)]] = std::int32_t;
 using Halves [[gnu::vector_size(16)]] = std::uint16_t;
@@ -72,12 +72,12 @@ inline std::uint64_t eight_bytes(const std::uint16_t* from) {
     return bytes;
 }
 
-/// Adds two neighbours in a row of texels; 65535 = 1.
+/// Adds two texels of a row, interpolated; 65535 = 1.
 inline void add_pair(const Image& t, const Between& x, int y, float weight, Bands& sum) {
     const std::uint16_t* row = t.rgb + 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(t.width);
     const std::uint16_t *const a = row + 3 * x.first, *const b = row + 3 * x.second;
     const float of_b = weight * x.part, of_a = weight - of_b;
-    if (b == a + 3)  // twelve bytes, read without those before or behind them
+    if (b == a + 3)  // reads exactly these twelve bytes
         sum += of_a * bands_of(eight_bytes(a)) + of_b * bands_of(eight_bytes(b - 1) >> 16);
     else
         sum += of_a * Bands{static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2]), 0} +
@@ -88,7 +88,7 @@ inline void add_pair(const Image& t, const Between& x, int y, float weight, Band
 inline void add_bilinear(const Image& t, const Edges& edges, double u, double v, float weight, Bands& sum) {
     const Between x = between(u, t.width, edges.repeat_u), y = between(1 - v, t.height, edges.repeat_v);
     const float of_lower = weight * y.part, of_upper = weight - of_lower;
-    if (edges.poles && y.first == y.second) {  // beyond the outermost row lies the same row, half a turn on
+    if (edges.poles && y.first == y.second) {  // the row beyond a pole is the same row, shifted by half a turn
         const Between opposite = between(u < 0.5 ? u + 0.5 : u - 0.5, t.width, true);
         add_pair(t, v > 0.5 ? opposite : x, y.first, of_upper, sum);
         add_pair(t, v > 0.5 ? x : opposite, y.first, of_lower, sum);
@@ -98,20 +98,20 @@ inline void add_bilinear(const Image& t, const Edges& edges, double u, double v,
     add_pair(t, x, y.second, of_lower, sum);
 }
 
-/// How a footprint is covered: lookups in a row about its middle, each from two neighbouring levels.
+/// Filter taps for a footprint: lookups in a row about its centre, each from two neighbouring mip levels.
 struct Filter {
     std::size_t level = 0;
     float towards_coarser = 0;  ///< weight of the next level
-    float level_texel = 1;      ///< width of what a single lookup stands for, in texels of the finest level
+    float level_texel = 1;      ///< filter width of a single lookup, in texels of the finest level
     int beside = 0;             ///< lookups on either side of the middle one
-    float last_weight = 1;      ///< of the outermost two, where the others count 1
-    double du = 0, dv = 0;      ///< from one to the next
+    float last_weight = 1;      ///< of the outermost two; the others have weight 1
+    double du = 0, dv = 0;      ///< step between lookups
 };
 
-/// A footprint as the ellipse that it is: lengths in texels of the finest level.
+/// A footprint as an ellipse: lengths in texels of the finest level.
 struct Ellipse {
     double major = 0, minor = 0;      ///< half axes
-    double along_x = 1, along_y = 0;  ///< unit, of the longer one; y up
+    double along_x = 1, along_y = 0;  ///< direction of the major axis, unit; y up
 };
 
 Ellipse ellipse_of(const Texture& t, const TextureFootprint& f) {
@@ -130,7 +130,7 @@ Ellipse ellipse_of(const Texture& t, const TextureFootprint& f) {
     return e;
 }
 
-/// The level whose texels are this wide, as a mix of two. Between two levels the weight grows linearly with the
+/// Chooses two levels and a weight for this texel width. Between two levels the weight grows linearly with the
 /// width.
 void choose_level(const Texture& t, float width, Filter& f) {
     const std::uint32_t bits = std::bit_cast<std::uint32_t>(width);  // width >= 1: 2^level (1 + towards_coarser)
@@ -140,8 +140,8 @@ void choose_level(const Texture& t, float width, Filter& f) {
     if (f.level >= t.coarser.size()) f.level = t.coarser.size(), f.towards_coarser = 0;
 }
 
-/// Width of a texel on a globe over its height, at most 1: towards the poles they are narrow, and what a map shows
-/// there does not change from one to the next.
+/// Ratio of width to height of a texel on a globe, at most 1: towards the poles texels are narrow, and neighbouring
+/// ones hardly differ.
 double narrowness(const Texture& t, float v) {
     return std::clamp(std::sin(std::numbers::pi * static_cast<double>(v)) * 2 * t.height / t.width, 0.0, 1.0);
 }
@@ -152,14 +152,14 @@ Filter filter_for(const Texture& t, const TextureFootprint& footprint, float v, 
     const Ellipse e = ellipse_of(t, footprint);
     const double length = 2 * e.major;
     if (length <= 1) return f;
-    if (!std::isfinite(length)) {  // or no number: all of the image
+    if (!std::isfinite(length)) {  // or NaN: mean of the whole image
         f.level = t.coarser.size();
         return f;
     }
-    double gap = length / kMostTaps;
+    double gap = length / kMaxTaps;
     double width = gap;
     if (layout == TextureLayout::globe) {
-        // Where texels are narrow, lookups may leave some out before v is blurred too.
+        // Where texels are narrow, lookups may skip some before v is blurred too.
         const double x = e.along_x * narrowness(t, v), y = e.along_y;
         width *= std::sqrt(x * x + y * y);
     }
@@ -173,7 +173,7 @@ Filter filter_for(const Texture& t, const TextureFootprint& footprint, float v, 
     return f;
 }
 
-/// A lookup at any place.
+/// A lookup at any position.
 void add_wrapped(const Image& t, const Edges& edges, double u, double v, float weight, Bands& sum) {
     if (edges.poles && !(v >= 0 && v <= 1)) {
         v -= 2 * std::floor(0.5 * v);  // once around over both poles is 2
@@ -182,7 +182,7 @@ void add_wrapped(const Image& t, const Edges& edges, double u, double v, float w
     add_bilinear(t, edges, into_unit(u, edges.repeat_u), into_unit(v, edges.repeat_v), weight, sum);
 }
 
-/// A lookup whose four texels lie in the image; x, y: texels from the middle of the first, y down.
+/// A lookup whose four texels lie in the image; x, y: texels from the centre of the first, y down.
 inline void add_inner(const Image& t, double x, double y, float weight, Bands& sum) {
     const int column = static_cast<int>(x), row = static_cast<int>(y);
     const float of_right = static_cast<float>(x - column), of_lower = weight * static_cast<float>(y - row);
@@ -190,7 +190,7 @@ inline void add_inner(const Image& t, double x, double y, float weight, Bands& s
     const std::uint16_t *const upper = t.rgb + static_cast<std::size_t>(row) * stride + 3 * column, *const lower =
                                                                                                         upper +
                                                                                                         stride;
-    // Each row's twelve bytes, read without those before or behind them.
+    // Reads exactly each row's twelve bytes.
     const Bands left = (weight - of_lower) * bands_of(eight_bytes(upper)) + of_lower * bands_of(eight_bytes(lower));
     const Bands right = (weight - of_lower) * bands_of(eight_bytes(upper + 2) >> 16) +
                         of_lower * bands_of(eight_bytes(lower + 2) >> 16);
@@ -219,11 +219,11 @@ Rgb filtered(const Texture& t, const Edges& edges, const Filter& f, double u, do
     add_level(image_of(t, f.level), edges, f, u, v, 1 - f.towards_coarser, sum);
     if (f.towards_coarser > 0) add_level(image_of(t, f.level + 1), edges, f, u, v, f.towards_coarser, sum);
     const float weights = f.beside > 0 ? static_cast<float>(2 * f.beside - 1) + 2 * f.last_weight : 1;
-    const float scale = kFullScale / weights;  // and rounding makes nothing whiter than white
+    const float scale = kFullScale / weights;  // the clamp removes rounding above 1
     return {std::min(sum[0] * scale, 1.0f), std::min(sum[1] * scale, 1.0f), std::min(sum[2] * scale, 1.0f)};
 }
 
-/// One lookup in the finest level: as `filtered` with a filter that covers nothing.
+/// One lookup in the finest level: `filtered` with an empty footprint.
 Rgb unfiltered(const Texture& t, const Edges& edges, double u, double v) {
     if (edges.repeat_u) u = into_unit(u, true);
     if (edges.repeat_v) v = into_unit(v, true);
@@ -234,7 +234,7 @@ Rgb unfiltered(const Texture& t, const Edges& edges, double u, double v) {
         add_inner(finest, x, y, 1, sum);
     else
         add_wrapped(finest, edges, u, v, 1, sum);
-    const Bands rgb = sum * kFullScale;  // rounding makes nothing whiter than white
+    const Bands rgb = sum * kFullScale;  // the clamp removes rounding above 1
     return {std::min(rgb[0], 1.0f), std::min(rgb[1], 1.0f), std::min(rgb[2], 1.0f)};
 }
 
@@ -261,13 +261,14 @@ TextureSlope texture_slope(const Texture& texture, float u, float v, const Textu
     const Filter f = filter_for(texture, footprint, v, layout);
     const double texel = static_cast<double>(f.level_texel), dv = texel / texture.height;
     double du = texel / texture.width;
-    // On a globe as far over the ground as along v, or rounded heights would be cliffs where texels are narrow.
+    // On a globe, u spans the same ground distance as v; otherwise rounded heights would become cliffs where texels
+    // are narrow.
     if (layout == TextureLayout::globe) du /= std::max(narrowness(texture, v), 1e-6);
-    const double most_u = std::min(du, 0.25);  // within a texel of a pole less than that: the slope fades away
+    const double max_u = std::min(du, 0.25);  // smaller within a texel of a pole: the slope fades away
     const auto height = [&](double by_u, double by_v) {
         return mean_band(filtered(texture, edges, f, static_cast<double>(u) + by_u, static_cast<double>(v) + by_v));
     };
-    return {(height(0.5 * most_u, 0) - height(-0.5 * most_u, 0)) / static_cast<float>(du),
+    return {(height(0.5 * max_u, 0) - height(-0.5 * max_u, 0)) / static_cast<float>(du),
             (height(0, 0.5 * dv) - height(0, -0.5 * dv)) / static_cast<float>(dv)};
 }
 

@@ -22,7 +22,7 @@ float number(const aiMaterial& m, const char* key, unsigned type, unsigned index
     return x;
 }
 
-/// What 3DS, PLY, DAE and STL give.
+/// The material of a 3DS, PLY, DAE or STL file.
 PlainMaterial::Numbers classic_material(const aiMaterial& m) {
     return {.diffuse = colour(m, AI_MATKEY_COLOR_DIFFUSE, {0.5f, 0.5f, 0.5f}),
             .specular = colour(m, AI_MATKEY_COLOR_SPECULAR, {}),

@@ -80,8 +80,8 @@ private:
 
     /// Assimp does not check the indices of some formats.
     bool is_sound(const aiFace& face, unsigned vertices) {
-        if (face.mNumIndices > kMostCorners)
-            problem_ = fmt::format("a face of {} corners, expected at most {}", face.mNumIndices, kMostCorners);
+        if (face.mNumIndices > kMaxCorners)
+            problem_ = fmt::format("a face of {} corners, expected at most {}", face.mNumIndices, kMaxCorners);
         for (unsigned k = 0; k < face.mNumIndices; ++k)
             if (face.mIndices[k] >= vertices)
                 problem_ = fmt::format("a face has vertex {}, counted from 0, of {}", face.mIndices[k], vertices);
@@ -117,7 +117,8 @@ private:
     std::string problem_;
 };
 
-/// Assimp tries all importers, by what the file begins with, when that of the extension fails: dozens of formats.
+/// Unregisters all other importers: when that of the extension fails, Assimp tries dozens of others, by the first
+/// bytes of the file.
 void keep_importer_of(const std::string& path, Assimp::Importer& importer) {
     const std::string extension = extension_of(path).substr(1);
     for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {

@@ -16,9 +16,9 @@ namespace narpa {
 /// Node transforms are applied. Only the importer of the file's extension is used, whatever the file begins with.
 MeshMessage read_with_assimp(const std::string& path);
 
-/// What Assimp 5.2 does not notice: it searches for the end of a PLY header for ever where there is none, and for
-/// elements that a header promises and no file of this size can hold; in a text file it takes the numbers of other
-/// lines for those that are missing.
+/// Checks for errors in a PLY file that Assimp 5.2 does not detect: it searches for ever if the header has no end,
+/// or has more elements than a file of this size can hold; in a text file it takes numbers of other lines for
+/// missing ones.
 Status check_ply(const std::string& path);
 
 /// A material that Assimp read from the file `path`. `warnings` gets what is left out.

@@ -7,8 +7,8 @@
 
 namespace narpa {
 
-// Inline, as a function that other libraries can replace is called instead, and loops over lanes with calls stay
-// scalar.
+// Inline, because the compiler does not inline functions that another library may replace, and loops with calls are
+// not vectorised.
 inline BrownConrady::Distorted BrownConrady::distort(double u, double v) const noexcept {
     const double s = u * u + v * v, uv = u * v;
     const double above = 1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3)),
@@ -30,11 +30,11 @@ namespace {
 
 using Model = BrownConrady;
 
-/// Of tan(angle from the axis): 89 degrees.
-constexpr double kMostPlane = 57.3;
-/// From the table's start, 1e-3 off at most with strong tangential terms, each step squares the error.
+/// Largest tan(angle from the axis): 89 degrees.
+constexpr double kMaxPlane = 57.3;
+/// The table's start is off by at most 1e-3 with strong tangential terms; each step squares the error.
 constexpr int kNewtonSteps = 5;
-/// Of a solution, in units of the plane z = 1.
+/// Largest residual of a solution, in units of the plane z = 1.
 constexpr double kResidual = 1e-10;
 
 struct PlanePoint {
@@ -59,8 +59,8 @@ inline PlanePoint start(const RadialInverse& inverse, const PlanePoint& wanted) 
     return {ratio * wanted.u, ratio * wanted.v};
 }
 
-/// The point of the plane z = 1 that is seen at `wanted` of the distorted one; the start of the search, on or near
-/// the rim, where there is none.
+/// The point of the plane z = 1 whose distorted image is `wanted`; if there is none, the start of the search, on or
+/// near the rim.
 inline PlanePoint undistort(const Model& m, const RadialInverse& inverse, const PlanePoint& wanted) noexcept {
     const PlanePoint begin = start(inverse, wanted);
     PlanePoint p = begin;
@@ -98,14 +98,14 @@ BrownConrady::BrownConrady(const Pinhole& pinhole, const Coefficients& coefficie
     : pinhole_(pinhole),
       c_(coefficients),
       inverse_(
-          kMostPlane, [&](double r) { return radius(r); }, [&](double r) { return slope(r); }) {}
+          kMaxPlane, [&](double r) { return radius(r); }, [&](double r) { return slope(r); }) {}
 
 double BrownConrady::radius(double r) const noexcept {
     const double s = r * r;
     return r * (1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3))) / (1 + s * (c_.k4 + s * (c_.k5 + s * c_.k6)));
 }
 
-/// 0 from the first pole on.
+/// Derivative of `radius`; 0 at and beyond the first pole.
 double BrownConrady::slope(double r) const noexcept {
     const double s = r * r;
     const double above = 1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3)),
@@ -132,7 +132,7 @@ std::optional<ImagePoint> BrownConrady::project(const Vec3& p) const noexcept {
     const double u = p.x / p.z, v = p.y / p.z;
     if (!(std::hypot(u, v) <= inverse_.most())) return std::nullopt;
     const Distorted d = distort(u, v);
-    if (!(std::hypot(d.u, d.v) <= inverse_.most_distorted())) return std::nullopt;
+    if (!(std::hypot(d.u, d.v) <= inverse_.max_distorted())) return std::nullopt;
     return pinhole_.of_plane(d.u, d.v);
 }
 
@@ -145,7 +145,7 @@ ProjectionJacobian BrownConrady::jacobian(const Vec3& p) const noexcept {
 
 bool BrownConrady::sees(const ImagePoint& p) const noexcept {
     const Vec3 wanted = pinhole_.on_plane(p);
-    if (!(std::hypot(wanted.x, wanted.y) <= inverse_.most_distorted())) return false;
+    if (!(std::hypot(wanted.x, wanted.y) <= inverse_.max_distorted())) return false;
     const auto [u, v] = undistort(*this, inverse_, {wanted.x, wanted.y});
     return is_solution(*this, inverse_, {wanted.x, wanted.y}, {u, v});
 }

@@ -1,6 +1,6 @@
-/// renderer/projection/brown_conrady.h - the pinhole behind a lens that distorts, as OpenCV's calib3d defines it.
+/// renderer/projection/brown_conrady.h - a pinhole with lens distortion, as OpenCV's calib3d defines it.
 ///
-/// Of a point (X, Y, Z), Z > 0, in camera axes: u = X / Z, v = Y / Z, r^2 = u^2 + v^2,
+/// For a point (X, Y, Z), Z > 0, in camera axes: u = X / Z, v = Y / Z, r^2 = u^2 + v^2,
 ///
 ///     L  = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
 ///     u' = u L + 2 p1 u v + p2 (r^2 + 2 u^2) + s1 r^2 + s2 r^4
@@ -17,7 +17,7 @@
 
 namespace narpa {
 
-/// Where r L no longer grows with r the image would fold over: nothing is seen beyond.
+/// The image ends where r L no longer grows with r, because it would fold over beyond.
 class BrownConrady final : public CameraModel {
 public:
     struct Coefficients {
@@ -39,7 +39,7 @@ public:
     [[nodiscard]] std::shared_ptr<const CameraModel> windowed(double x, double y) const override;
     [[nodiscard]] bool is_valid() const noexcept override;
 
-    /// A point of the plane z = 1 and its image there, with the derivatives of the one by the other.
+    /// The distorted image of a point of the plane z = 1, and its derivatives: u_by_v is du'/dv.
     struct Distorted {
         double u, v, u_by_u, u_by_v, v_by_u, v_by_v;
     };

@@ -20,8 +20,9 @@ double CameraModel::pixels_per_sr(const Vec3& d) const noexcept {
     return norm(cross(x, y));
 }
 
-/// Sixteen points of the border. Between two of them it strays from the nearer one by half their distance, and a
-/// little more where it is curved. The interior lies within: where the camera sees, directions do not fold.
+/// From sixteen points of the border. Between two of them the border deviates from the nearer one by half their
+/// distance, and a little more where it is curved. The interior lies within, because the projection does not fold
+/// where the camera sees.
 DirectionCone cone_about_border(const CameraModel& model, const ImageRect& r) noexcept {
     constexpr double kStray = 0.6;
     constexpr std::size_t kPerEdge = kLanes / 4;

@@ -1,12 +1,12 @@
-/// renderer/projection/camera_model.h - which ray passes a point of the image, and where a point of the scene
-/// appears.
+/// renderer/projection/camera_model.h - camera projection: rays through image points, and image points of the
+/// scene.
 ///
 /// Camera axes: x right, y down, z forward, origin at the centre of projection, metres. Image points are in pixels;
 /// the centre of the top-left pixel is (0, 0), as in OpenCV, so that pixel (i, j) extends half a pixel to each
 /// side.
 ///
-/// A new kind of camera is a class of its own, set as Camera::model: renderer, tile culling and estimator use this
-/// interface alone. Algorithms that need straight lines to stay straight ask for `pinhole()`.
+/// A new kind of camera is a class of its own, set as Camera::model: renderer, tile culling and estimator use only
+/// this interface. Algorithms that need straight lines to stay straight use `pinhole()`.
 #pragma once
 
 #include <memory>
@@ -32,11 +32,11 @@ struct DirectionCone {
     double half_angle_rad = 0;
 };
 
-/// How the image point moves with the point of the scene: gradients of x and of y, px per metre, camera axes.
+/// Derivatives of the image point by the point of the scene: gradients of x and of y, px per metre, camera axes.
 struct ProjectionJacobian {
     Vec3 x{}, y{};
 };
-/// The largest singular value: px that a point moves by at most, per metre.
+/// The largest singular value: largest motion of the image point in px per metre.
 [[nodiscard]] double largest_stretch(const ProjectionJacobian& J) noexcept;
 
 class Pinhole;
@@ -48,37 +48,38 @@ public:
 
     /// Unit direction of the ray through an image point. Continues smoothly where the camera does not see.
     [[nodiscard]] virtual Vec3 direction(const ImagePoint& p) const noexcept = 0;
-    /// The same of length z = 1, for rays with z > 0.
+    /// The same scaled to z = 1, for rays with z > 0.
     [[nodiscard]] virtual Vec3 on_plane(const ImagePoint& p) const noexcept {
         const Vec3 d = direction(p);
         return d / d.z;
     }
-    /// Unit directions for a batch, in the axes that `q` turns camera axes into.
+    /// Unit directions for a batch, rotated by `q` from camera axes.
     virtual void directions(const Quat& q, const Lanes<double>& x, const Lanes<double>& y,
                             Vec3Lanes& out) const noexcept;
-    /// Where a point (camera axes; any length, so a direction as well) appears, on or off the detector. Nothing
-    /// where no ray comes from: of a pinhole z <= 0.
+    /// Image point of a point (camera axes; any length, so a direction as well), on or off the detector. Nullopt if
+    /// no ray comes from there: for a pinhole z <= 0.
     [[nodiscard]] virtual std::optional<ImagePoint> project(const Vec3& point) const noexcept = 0;
-    /// Of `project`, at a point that has an image.
+    /// Jacobian of `project`, at a point that has an image.
     [[nodiscard]] virtual ProjectionJacobian jacobian(const Vec3& point) const noexcept = 0;
-    /// Does light reach the detector there? False beyond the image circle of a lens: such pixels stay black. Where
-    /// it is true is convex.
+    /// True if light reaches the detector there. False beyond the image circle of a lens: such pixels stay black.
+    /// The region where it is true is convex.
     [[nodiscard]] virtual bool sees(const ImagePoint&) const noexcept { return true; }
 
-    /// Image area per solid angle about a unit direction that has an image, px^2 sr^-1; 1 over it is the solid
+    /// Image area per solid angle around a unit direction that has an image, px^2 sr^-1; its inverse is the solid
     /// angle of a pixel.
     [[nodiscard]] virtual double pixels_per_sr(const Vec3& direction) const noexcept;
-    /// Along x at the centre of projection: 1 over it is the angular width of a pixel.
+    /// Along x at the principal point: its inverse is the angular width of a pixel.
     [[nodiscard]] virtual double pixels_per_radian() const noexcept = 0;
-    /// Holds the directions of all rays through a rectangle of the image.
+    /// A cone that contains the directions of all rays through a rectangle of the image.
     [[nodiscard]] virtual DirectionCone bounds(const ImageRect& rect) const noexcept = 0;
 
-    /// Of an image with so many times the pixels along x and y over the same field of view.
+    /// The model of an image with the number of pixels along x and y multiplied by these factors, with the same
+    /// field of view.
     [[nodiscard]] virtual std::shared_ptr<const CameraModel> scaled(double factor_x, double factor_y) const = 0;
-    /// Of the part of the image whose top-left pixel is (x, y).
+    /// The model of the part of the image whose top-left pixel is (x, y).
     [[nodiscard]] virtual std::shared_ptr<const CameraModel> windowed(double x, double y) const = 0;
 
-    /// Finite parameters that define a projection.
+    /// True if the parameters are finite and define a projection.
     [[nodiscard]] virtual bool is_valid() const noexcept { return true; }
     /// Itself if it is a pinhole, else null.
     [[nodiscard]] virtual const Pinhole* pinhole() const noexcept { return nullptr; }

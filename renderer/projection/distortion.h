@@ -1,4 +1,4 @@
-/// renderer/projection/distortion.h - lens distortion as calibrations give it.
+/// renderer/projection/distortion.h - lens distortion coefficients from a calibration.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace narpa {
 
-/// In OpenCV's order and with its meaning: brown_conrady.h, kannala_brandt.h.
+/// In OpenCV's order and definition: brown_conrady.h, kannala_brandt.h.
 struct Distortion {
     enum class Model : std::uint8_t {
         opencv,   ///< k1, k2, p1, p2 [, k3 [, k4, k5, k6 [, s1, s2, s3, s4]]]: 4, 5, 8 or 12 numbers
@@ -18,7 +18,7 @@ struct Distortion {
     std::vector<double> coefficients;
 };
 
-/// Null where the model does not take so many coefficients.
+/// Null if the model does not take this number of coefficients.
 [[nodiscard]] std::shared_ptr<const CameraModel> distorted(const Pinhole& pinhole, const Distortion& distortion);
 
 }  // namespace narpa

@@ -11,8 +11,8 @@
 
 namespace narpa {
 
-// Inline, as functions that other libraries can replace are called instead, and loops over lanes with calls stay
-// scalar.
+// Inline, because the compiler does not inline functions that another library may replace, and loops with calls are
+// not vectorised.
 inline double KannalaBrandt::radius(double theta) const noexcept {
     const double s = theta * theta;
     return theta * (1 + s * (c_.k1 + s * (c_.k2 + s * (c_.k3 + s * c_.k4))));
@@ -24,16 +24,17 @@ inline double KannalaBrandt::slope(double theta) const noexcept {
 
 namespace {
 
-/// At 180 degrees all points of a circle would be one direction.
-constexpr double kMostAngle_rad = 3.14;
-/// The table's start is 1e-5 off at most but for the last entries before a rim where the slope ends.
+/// Just below 180 degrees, where a whole circle would be one direction.
+constexpr double kMaxAngle_rad = 3.14;
+/// The table's start is off by at most 1e-5, except in the last entries before a rim where the slope ends.
 constexpr int kAngleSteps = 4;
 
 inline double newton_step(const KannalaBrandt& m, double distorted, double theta) noexcept {
     return theta - (m.radius(theta) - distorted) / m.slope(theta);
 }
 
-/// `theta`: where the search from `begin` has ended; that is the direction on or near the rim, where there is none.
+/// Direction for the result `theta` of the search from `begin`; if that has no solution, a direction on or near the
+/// rim.
 inline Vec3 direction_at(const KannalaBrandt& m, const RadialInverse& inverse, const Vec3& wanted, double distorted,
                          double begin, double theta) noexcept {
     const bool converged = std::abs(m.radius(theta) - distorted) < 1e-10;
@@ -79,7 +80,7 @@ KannalaBrandt::KannalaBrandt(const Pinhole& pinhole, const Coefficients& coeffic
     : pinhole_(pinhole),
       c_(coefficients),
       inverse_(
-          kMostAngle_rad, [&](double t) { return radius(t); }, [&](double t) { return slope(t); }) {}
+          kMaxAngle_rad, [&](double t) { return radius(t); }, [&](double t) { return slope(t); }) {}
 
 Vec3 KannalaBrandt::direction(const ImagePoint& p) const noexcept {
     return direction_of(*this, inverse_, pinhole_.on_plane(p));
@@ -109,7 +110,7 @@ ProjectionJacobian KannalaBrandt::jacobian(const Vec3& p) const noexcept {
 
 bool KannalaBrandt::sees(const ImagePoint& p) const noexcept {
     const Vec3 wanted = pinhole_.on_plane(p);
-    return std::hypot(wanted.x, wanted.y) <= inverse_.most_distorted();
+    return std::hypot(wanted.x, wanted.y) <= inverse_.max_distorted();
 }
 
 DirectionCone KannalaBrandt::bounds(const ImageRect& rect) const noexcept {

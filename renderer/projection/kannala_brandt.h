@@ -1,6 +1,6 @@
 /// renderer/projection/kannala_brandt.h - a fisheye lens, as OpenCV's fisheye module defines it.
 ///
-/// Of a point (X, Y, Z) in camera axes, at the angle theta from the z axis:
+/// For a point (X, Y, Z) in camera axes, at the angle theta from the z axis:
 ///
 ///     theta' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)
 ///     (x, y) = (cx, cy) + theta' (fx X, fy Y) / hypot(X, Y).
@@ -15,7 +15,7 @@
 
 namespace narpa {
 
-/// Where theta' no longer grows with theta, and at 180 degrees, nothing is seen any more.
+/// The image ends where theta' no longer grows with theta, and at 180 degrees.
 class KannalaBrandt final : public CameraModel {
 public:
     struct Coefficients {

@@ -7,7 +7,7 @@
 namespace narpa {
 namespace {
 
-/// `out` overlaps with nothing: results are gathered in an array that the compiler knows to be alone.
+/// Results are gathered in a local array, which the compiler knows not to alias anything.
 NARPA_EACH_ISA void pinhole_directions(const Pinhole& pinhole, const Quat& q, const Lanes<double>& x,
                                        const Lanes<double>& y, Vec3Lanes& out) noexcept {
     Vec3Lanes direction;
@@ -25,8 +25,8 @@ void Pinhole::directions(const Quat& q, const Lanes<double>& x, const Lanes<doub
     pinhole_directions(*this, q, x, y, out);
 }
 
-/// About the ray through the middle, as wide as the widest corner: a cone of less than 90 degrees cuts the image
-/// plane in a convex figure.
+/// Around the ray through the middle, as wide as the farthest corner: a cone of less than 90 degrees intersects the
+/// image plane in a convex region, which contains the rectangle.
 DirectionCone Pinhole::bounds(const ImageRect& r) const noexcept {
     DirectionCone cone{direction({0.5 * (r.x_low + r.x_high), 0.5 * (r.y_low + r.y_high)}), 0};
     for (const double x : {r.x_low, r.x_high})

@@ -1,4 +1,4 @@
-/// renderer/projection/pinhole.h - the camera without a lens: straight lines stay straight.
+/// renderer/projection/pinhole.h - the pinhole camera, without distortion.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
-/// renderer/projection/radial_inverse.h - where the inverse of a distortion starts: the radius r before it from the
-/// radius r' after it, by a table.
+/// renderer/projection/radial_inverse.h - initial value for inverting a radial distortion: a table of the
+/// undistorted radius r over the distorted radius r'.
 #pragma once
 
 #include <algorithm>
@@ -8,18 +8,18 @@
 
 namespace narpa {
 
-/// Of a function r'(r) that grows from r'(0) = 0 up to some r and is not used beyond.
+/// Inverse of a function r'(r) that grows from r'(0) = 0 up to some r, and is not used beyond.
 class RadialInverse {
 public:
     /// `distorted(r)` and its derivative `slope(r)`. The domain ends at `at_most`, or where the slope leaves
-    /// kLeastSlope .. kMostSlope.
+    /// kMinSlope .. kMaxSlope.
     template <class Distorted, class Slope>
     RadialInverse(double at_most, const Distorted& distorted, const Slope& slope) {
         constexpr int kSteps = 1 << 14;
         const double step = at_most / kSteps;
         const auto grows = [&](double r) {
             const double s = slope(r);
-            return s > kLeastSlope && s < kMostSlope;
+            return s > kMinSlope && s < kMaxSlope;
         };
         int good = 0;
         while (good < kSteps && grows((good + 1) * step)) ++good;
@@ -31,11 +31,11 @@ public:
                 (grows(middle) ? most_ : bad) = middle;
             }
         }
-        most_distorted_ = distorted(most_);
-        per_entry_ = kEntries / most_distorted_;
+        max_distorted_ = distorted(most_);
+        per_entry_ = kEntries / max_distorted_;
         ratio_[0] = 1 / slope(0);
         for (std::size_t i = 1; i <= kEntries; ++i) {
-            const double wanted = most_distorted_ * static_cast<double>(i) / kEntries;
+            const double wanted = max_distorted_ * static_cast<double>(i) / kEntries;
             double low = 0, high = most_;
             for (int k = 0; k < 60; ++k) {
                 const double middle = 0.5 * (low + high);
@@ -46,9 +46,9 @@ public:
         ratio_[kEntries + 1] = ratio_[kEntries];
     }
 
-    /// The domain: r <= most(), r' <= most_distorted().
+    /// The domain: r <= most(), r' <= max_distorted().
     [[nodiscard]] double most() const noexcept { return most_; }
-    [[nodiscard]] double most_distorted() const noexcept { return most_distorted_; }
+    [[nodiscard]] double max_distorted() const noexcept { return max_distorted_; }
 
     /// r / r', approximately; beyond the domain most() / r', the rim.
     [[nodiscard]] double ratio(double distorted) const noexcept {
@@ -56,14 +56,14 @@ public:
         const auto i = static_cast<std::size_t>(static_cast<int>(place));
         const double part = place - static_cast<double>(static_cast<int>(place));
         const double inside = ratio_[i] + part * (ratio_[i + 1] - ratio_[i]);
-        return distorted > most_distorted_ ? most_ / distorted : inside;
+        return distorted > max_distorted_ ? most_ / distorted : inside;
     }
 
 private:
     static constexpr std::size_t kEntries = 256;
-    static constexpr double kLeastSlope = 1e-3;  ///< of a scale of 1 at the centre: below, the image folds over
-    static constexpr double kMostSlope = 1e6;    ///< above, no lens is meant
-    double most_ = 0, most_distorted_ = 0, per_entry_ = 0;
+    static constexpr double kMinSlope = 1e-3;  ///< relative to the centre; below, the image folds over
+    static constexpr double kMaxSlope = 1e6;   ///< no real lens exceeds it
+    double most_ = 0, max_distorted_ = 0, per_entry_ = 0;
     std::array<double, kEntries + 2> ratio_{};
 };
 

@@ -8,7 +8,7 @@
 namespace narpa {
 namespace {
 
-/// Nodes are moved, not copied: a copy would lose its place in the file.
+/// Nodes are moved, not copied: a copy would lose its source location.
 void merge(toml::table& over, toml::table&& base) {
     for (auto&& [key, node] : base) {
         toml::node* const own = over.get(key.str());

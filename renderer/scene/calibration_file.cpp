@@ -20,8 +20,8 @@ YAML::Node part(const YAML::Node& document, const char* key, const char* expecte
 int pixels(const YAML::Node& document, const char* key) {
     const YAML::Node node = part(document, key, "a number of pixels");
     int n = 0;
-    if (!YAML::convert<int>::decode(node, n) || n < 1 || n > kMostPixelsPerSide)
-        throw YamlFault{fmt::format("{}: expected an integer in [1, {}]", key, kMostPixelsPerSide), node.Mark()};
+    if (!YAML::convert<int>::decode(node, n) || n < 1 || n > kMaxPixelsPerSide)
+        throw YamlFault{fmt::format("{}: expected an integer in [1, {}]", key, kMaxPixelsPerSide), node.Mark()};
     return n;
 }
 

@@ -1,4 +1,4 @@
-/// renderer/scene/calibration_file.h - a camera's calibration as OpenCV and ROS keep it.
+/// renderer/scene/calibration_file.h - a camera's calibration in the files of OpenCV and ROS.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@
 
 namespace narpa {
 
-inline constexpr int kMostPixelsPerSide = 16384;  ///< of a camera's image
+inline constexpr int kMaxPixelsPerSide = 16384;  ///< of a camera's image
 
 struct Calibration {
     int width = 0, height = 0;
@@ -22,7 +22,7 @@ struct Calibration {
 /// distortion_coefficients; rectification and projection are not. Errors name the file and the line.
 [[nodiscard]] Result<Calibration> read_calibration(const std::string& file);
 
-/// The same, as a file that both read.
+/// The text of a file that both can read.
 [[nodiscard]] std::string calibration_text(const std::string& camera_name, const Calibration& calibration);
 
 }  // namespace narpa

@@ -1,4 +1,4 @@
-/// renderer/scene/confined_reader.h - for the programs that reader_process.h starts: their limits, and their pipe.
+/// renderer/scene/confined_reader.h - resource limits and output pipe of the programs that reader_process.h starts.
 #pragma once
 
 #include <fcntl.h>
@@ -16,7 +16,7 @@ namespace narpa {
 /// Exit status of a reader that has no memory left; others are 0, or those of a crash.
 inline constexpr int kOutOfMemory = 3;
 
-/// Ends with the program that started it; within limits of memory and time; without words of its own.
+/// Confines the calling process: it ends with its parent, has limits of memory and CPU time, and prints nothing.
 inline void confine_reader(rlim_t memory_bytes, rlim_t seconds) {
     constexpr bool kSanitized = NARPA_SANITIZED;  // sanitizers reserve terabytes of addresses, and report on stderr
     const auto limit = [](decltype(RLIMIT_AS) what, rlim_t most) {
@@ -26,10 +26,10 @@ inline void confine_reader(rlim_t memory_bytes, rlim_t seconds) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     std::set_new_handler([] { _exit(kOutOfMemory); });
     if (!kSanitized) limit(RLIMIT_AS, memory_bytes);
-    limit(RLIMIT_CPU, seconds + 1);  // narpa ends it before, unless that is gone
+    limit(RLIMIT_CPU, seconds + 1);  // narpa kills it earlier, unless narpa itself has ended
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_FSIZE, 0);
-    // A crash is reported by narpa; the C library's words about it would stand among those of narpa.
+    // narpa reports a crash; the C library's message would appear among narpa's own output.
     if (const int nothing = open("/dev/null", O_WRONLY); !kSanitized && nothing >= 0) dup2(nothing, STDERR_FILENO);
 }
 

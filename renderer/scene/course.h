@@ -8,7 +8,7 @@ namespace narpa {
 class Course {
 public:
     virtual ~Course() = default;
-    /// World. Velocity and rate are the pose's derivatives. From any thread; allocates nothing.
+    /// In world; velocity and rate are the derivatives of the pose. Thread-safe; allocates nothing.
     [[nodiscard]] virtual Motion at(double t_s) const noexcept = 0;
 };
 

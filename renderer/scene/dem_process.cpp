@@ -18,7 +18,7 @@ constexpr std::uint64_t kWorkingMemory = std::uint64_t{1} << 30;  // GDAL and it
 template <class Request, class F>
 void for_each_number(Request& r, const F& f) {
     f(r.on), f(r.radii), f(r.scale), f(r.offset_m), f(r.no_data), f(r.post_spacing_m), f(r.equatorial_m);
-    f(r.polar_m), f(r.detail.posts_per_post), f(r.detail.craters), f(r.detail.rocks), f(r.detail.seed);
+    f(r.polar_m), f(r.detail.refinement_factor), f(r.detail.craters), f(r.detail.rocks), f(r.detail.seed);
     f(r.options.error_px), f(r.options.pixels_per_rad), f(r.options.error_m), f(r.options.budget_bytes);
 }
 

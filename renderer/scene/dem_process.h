@@ -1,5 +1,5 @@
 /// renderer/scene/dem_process.h - DEM files read with GDAL, in a process of its own, narpa-dem-reader: the one
-/// place that GDAL is linked to. A damaged file may crash it, and nothing else.
+/// place that GDAL is linked to. A damaged file can crash only that process.
 #pragma once
 
 #include <limits>
@@ -11,11 +11,11 @@
 
 namespace narpa {
 
-/// A DEM as a scene names it. What is not a number is taken from the file.
+/// A DEM as a scene names it. NaN values are taken from the file.
 struct DemRequest {
     /// The frame of the body.
     enum class On : std::uint8_t {
-        plane,      ///< x along the columns, mostly east, z up; origin amid the posts, at height 0
+        plane,      ///< x along the columns, mostly east, z up; origin in the middle of the posts, at height 0
         ellipsoid,  ///< that of the planet
         tangent,    ///< x east, y north, z up, at the middle of the posts and height 0, on the ellipsoid
     };
@@ -31,7 +31,7 @@ struct DemRequest {
     TerrainOptions options{};
 };
 
-/// Words for the program's command line, and back; the second is false where they are not all there.
+/// Converts a request to an argument of the program, and back; the latter is false if a value is missing.
 [[nodiscard]] std::string to_argument(const DemRequest& request);
 [[nodiscard]] bool from_argument(const std::string& argument, DemRequest& request);
 
@@ -47,7 +47,7 @@ struct DemReaderLimits {
     int seconds = 600;               ///< wall time
 };
 
-/// Errors: those of the file; a limit that was reached; a crash of the process; that there is no narpa-dem-reader.
+/// Errors: those of the file; a limit that was reached; a crash of the process; narpa-dem-reader is not found.
 Result<TerrainMesh> read_dem_in_process(const DemRequest& request, const DemReaderLimits& limits = {});
 
 }  // namespace narpa

@@ -108,12 +108,12 @@ std::optional<Quat> q_icrs_body(std::string_view body, std::int64_t unix_ns) {
     return std::nullopt;
 }
 
-std::optional<Turning> turning_of(std::string_view body, std::int64_t unix_ns) {
+std::optional<BodyRotation> body_rotation_of(std::string_view body, std::int64_t unix_ns) {
     constexpr std::int64_t kMinute_ns = 60'000'000'000;
     const auto now = q_icrs_body(body, unix_ns), before = q_icrs_body(body, unix_ns - kMinute_ns),
                after = q_icrs_body(body, unix_ns + kMinute_ns);
     if (!now) return std::nullopt;
-    return Turning{*now, rotation_vector(conjugate(*before) * *after) / 120.0};
+    return BodyRotation{*now, rotation_vector(conjugate(*before) * *after) / 120.0};
 }
 
 }  // namespace narpa

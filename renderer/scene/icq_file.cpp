@@ -12,9 +12,10 @@ namespace narpa {
 
 namespace {
 
-constexpr double kMostIcqCells = 4096;
+constexpr double kMaxIcqCells = 4096;
 
-/// The three numbers of a line, of which the first token is read; `token` is the one that is none.
+/// The three numbers of a line, whose first token has been read; on failure `token` is the one that is not a
+/// number.
 std::optional<Vec3> vertex_of(TextCursor& text, std::string_view& token) {
     Vec3 v;
     for (int k = 0; k < 3; ++k) {
@@ -55,8 +56,8 @@ Result<TriangleSoup> read_icq(const std::string& path) {
     std::string_view token;
     while (token.empty() && text.next_line()) token = text.token();
     const auto cells = number_from(token);
-    if (!cells || !(*cells >= 1 && *cells <= kMostIcqCells) || *cells != std::floor(*cells))
-        return text.error(token, fmt::format("expected the number of cells along an edge, 1 to {}", kMostIcqCells));
+    if (!cells || !(*cells >= 1 && *cells <= kMaxIcqCells) || *cells != std::floor(*cells))
+        return text.error(token, fmt::format("expected the number of cells along an edge, 1 to {}", kMaxIcqCells));
     const auto q = static_cast<std::uint32_t>(*cells), n = q + 1;
 
     TriangleSoup soup;

@@ -23,8 +23,8 @@ struct ImageCodecs {
                      const std::vector<int>& parameters) = nullptr;
 };
 
-/// For reading or writing this file; from any thread. Errors name it: the library or one of the functions is not
-/// there, with the loader's reason.
+/// The codecs; thread-safe. Errors name `file` and the loader's reason: the library or one of its functions is
+/// missing.
 Result<ImageCodecs> image_codecs(const std::string& file);
 
 }  // namespace narpa

@@ -7,7 +7,7 @@ namespace narpa {
 
 namespace {
 
-/// The bytes of a file; those behind its end are 0.
+/// The bytes of a file; those beyond its end read as 0.
 class Bytes {
 public:
     explicit Bytes(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

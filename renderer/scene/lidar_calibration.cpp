@@ -19,13 +19,13 @@ double number(const YAML::Node& laser, const char* key, double most) {
 }
 
 LidarBeam read_beam(const YAML::Node& laser) {
-    constexpr double kMost_m = 10, kMost_rad = 3.2;
-    if (number(laser, "horiz_offset_correction", kMost_m) != 0)
+    constexpr double kMax_m = 10, kMax_rad = 3.2;
+    if (number(laser, "horiz_offset_correction", kMax_m) != 0)
         throw YamlFault{"horiz_offset_correction: expected 0, as beams start on the axis", laser.Mark()};
-    return {.elevation_rad = number(laser, "vert_correction", kMost_rad / 2),
-            .azimuth_rad = -number(laser, "rot_correction", kMost_rad),
-            .range_offset_m = number(laser, "dist_correction", kMost_m),
-            .height_m = number(laser, "vert_offset_correction", kMost_m)};
+    return {.elevation_rad = number(laser, "vert_correction", kMax_rad / 2),
+            .azimuth_rad = -number(laser, "rot_correction", kMax_rad),
+            .range_offset_m = number(laser, "dist_correction", kMax_m),
+            .height_m = number(laser, "vert_offset_correction", kMax_m)};
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ std::vector<PatternShot> read_beams(std::vector<TableReader> tables) {
     return shots;
 }
 
-/// Where the cells of a row lie across the field of view.
+/// Whether cells have equal steps of the tangent or of the angle across the field of view.
 enum class Spacing : std::uint8_t { tangents, angles };
 enum class Scan : std::uint8_t { flash, rows, columns };
 
@@ -80,12 +80,12 @@ void read_grid(TableReader table, LidarPattern& pattern) {
         {{"tangents", Spacing::tangents}, {"angles", Spacing::angles}}};
     static constexpr std::array<std::pair<std::string_view, Scan>, 3> kScans{
         {{"flash", Scan::flash}, {"rows", Scan::rows}, {"columns", Scan::columns}}};
-    constexpr std::int64_t kMostCells = 65'535;
+    constexpr std::int64_t kMaxCells = 65'535;
     Grid g;
     for (const char* key : {"columns", "rows"}) table.require(key, "a count");
     for (const char* key : {"fov_horizontal_deg", "fov_vertical_deg"}) table.require(key, "an angle");
-    g.columns = table.integer("columns", 1, kMostCells).value_or(1);
-    g.rows = table.integer("rows", 1, kMostCells).value_or(1);
+    g.columns = table.integer("columns", 1, kMaxCells).value_or(1);
+    g.rows = table.integer("rows", 1, kMaxCells).value_or(1);
     g.spacing = table.choice<Spacing>("spacing", kSpacings).value_or(Spacing::tangents);
     const double most = g.spacing == Spacing::tangents ? 170 : 360;
     const auto fov = [&](const char* key, double limit) {
@@ -99,10 +99,10 @@ void read_grid(TableReader table, LidarPattern& pattern) {
     if (g.scan == Scan::flash)
         for (const char* key : {"two_way", "scan_share"}) table.refuse(key, "all shots of a flash fire at once");
     table.finish();
-    const auto most_shots = static_cast<std::int64_t>(LidarPattern::kMostShots);
-    if (g.columns * g.rows > most_shots) {
+    const auto max_shots = static_cast<std::int64_t>(LidarPattern::kMaxShots);
+    if (g.columns * g.rows > max_shots) {
         table.fail("columns",
-                   fmt::format("{} x {} shots a frame, expected at most {}", g.columns, g.rows, most_shots));
+                   fmt::format("{} x {} shots a frame, expected at most {}", g.columns, g.rows, max_shots));
         return;
     }
     pattern.shots = shots_of(g);
@@ -115,19 +115,19 @@ void read_grid(TableReader table, LidarPattern& pattern) {
 }
 
 std::vector<PatternShot> read_spin(TableReader table) {
-    constexpr std::int64_t kMostColumns = 65'536;
-    constexpr std::size_t kMostBeams = 256;
+    constexpr std::int64_t kMaxColumns = 65'536;
+    constexpr std::size_t kMaxBeams = 256;
     table.require("columns", "a count: firings in a turn");
     table.require("elevation_deg", "an array of angles, one for each laser");
-    const std::int64_t columns = table.integer("columns", 1, kMostColumns).value_or(1);
+    const std::int64_t columns = table.integer("columns", 1, kMaxColumns).value_or(1);
     const auto angles = [&](const char* key, std::size_t count, const Range& range) {
         std::vector<double> all;
         const toml::node* node = table.find(key);
         const toml::array* array = node ? node->as_array() : nullptr;
         if (node &&
-            (!array || array->empty() || array->size() > kMostBeams || (count > 0 && array->size() != count)))
+            (!array || array->empty() || array->size() > kMaxBeams || (count > 0 && array->size() != count)))
             table.fail(key, count > 0 ? fmt::format("expected an array of {} numbers", count)
-                                      : fmt::format("expected an array of 1 to {} numbers", kMostBeams));
+                                      : fmt::format("expected an array of 1 to {} numbers", kMaxBeams));
         else if (array)
             all = table.numbers(key, {array->size()}, range).value_or(std::vector<double>(array->size()));
         return all;
@@ -137,8 +137,8 @@ std::vector<PatternShot> read_spin(TableReader table) {
     azimuth_deg.resize(elevation_deg.size());
     table.finish();
     const auto shots = static_cast<std::size_t>(columns) * elevation_deg.size();
-    if (shots > LidarPattern::kMostShots) {
-        table.fail("columns", fmt::format("{} shots a turn, expected at most {}", shots, LidarPattern::kMostShots));
+    if (shots > LidarPattern::kMaxShots) {
+        table.fail("columns", fmt::format("{} shots a turn, expected at most {}", shots, LidarPattern::kMaxShots));
         return {};
     }
     std::vector<PatternShot> all;
@@ -153,21 +153,21 @@ std::vector<PatternShot> read_spin(TableReader table) {
     return all;
 }
 
-/// A row per shot.
+/// Reads a CSV file with a row for each shot.
 Result<std::vector<PatternShot>> read_shots(const std::string& file) {
     constexpr std::string_view kHeader = "phase,azimuth_deg,elevation_deg,beam";
     std::vector<PatternShot> shots;
     const auto take = [&](std::string_view line, int number) -> Status {
         std::array<double, 4> x{};
         const auto cells = cells_of(line);
-        bool good = cells.size() == x.size() && shots.size() < LidarPattern::kMostShots;
+        bool good = cells.size() == x.size() && shots.size() < LidarPattern::kMaxShots;
         for (std::size_t i = 0; good && i < x.size(); ++i) good = read_number(trimmed(cells[i]), x[i]);
         good = good && kPhase.holds(x[0]) && kAzimuth_deg.holds(x[1]) && kElevation_deg.holds(x[2]) && x[3] >= 0 &&
                x[3] <= 65535 && x[3] == std::floor(x[3]);
         if (!good)
             return Error{fmt::format("expected {}: phase in [0, 1), angles within 720 and 90 deg, a beam of 0 to "
                                      "65535; at most {} rows",
-                                     kHeader, LidarPattern::kMostShots),
+                                     kHeader, LidarPattern::kMaxShots),
                          file, number, 1};
         if (!shots.empty() && x[0] < shots.back().phase)
             return Error{"fires before the shot above it, expected the order of firing", file, number, 1};

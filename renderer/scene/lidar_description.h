@@ -1,4 +1,4 @@
-/// renderer/scene/lidar_description.h - instruments that a TOML file describes: docs/lidar-description.md.
+/// renderer/scene/lidar_description.h - reads LiDAR descriptions in TOML: docs/lidar-description.md.
 #pragma once
 
 #include <string>

@@ -6,7 +6,7 @@
 
 namespace narpa {
 
-/// As noise, or as a quantity of its packets.
+/// Whether sunlight affects the noise or is a quantity of the packets.
 [[nodiscard]] inline bool sees_sunlight(const Lidar& lidar) {
     return lidar.receiver.sunlight_noise > 0 || (lidar.model && lidar.model->spec().measures_sunlight);
 }

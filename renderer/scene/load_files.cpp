@@ -55,7 +55,7 @@ private:
         return {canonical(texture.file), use.colour, use.wrap};
     }
 
-    /// A line of the mesh file, where it is known, else the scene's.
+    /// Reports an error at its line of the mesh file, if known, else at the scene's line.
     void blame(const NamedMesh& named, Error error) {
         if (error.line == 0) return r_.problems.add(named.place, "mesh: " + error.text());
         error.what += fmt::format(" (mesh of body \"{}\", {}:{})", r_.scene.bodies[named.body].name,
@@ -119,7 +119,7 @@ private:
         }
     }
 
-    /// -1 where the image holds heights.
+    /// Index of the normal map; -1 if the image holds heights.
     Result<int> normal_map_index(const MeshTexture& bump) {
         const TextureUse use{.colour = Colour::normals, .wrap = bump.wrap};
         if (heights_.contains(canonical(bump.file))) return -1;
@@ -142,7 +142,7 @@ private:
         return sum[2] - std::max(sum[0], sum[1]) > 0.2 * white;
     }
 
-    /// -1 where the image cannot be read; that is reported with its consequence.
+    /// Index of the texture; -1 if the image cannot be read, with a warning that states the consequence.
     int index_or_warn(const MeshTexture& texture, Colour colour, const char* otherwise) {
         const Result<int> index = texture_index(texture, {.colour = colour, .wrap = texture.wrap});
         if (index) return *index;

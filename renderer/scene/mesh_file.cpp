@@ -52,7 +52,7 @@ private:
     std::vector<Key> keys_;
 };
 
-/// Bits by which equal numbers are equal: -0 counts as 0.
+/// Bit pattern for keys, equal for equal numbers: -0 counts as 0.
 std::uint32_t bits(float x) {
     return std::bit_cast<std::uint32_t>(x + 0.0f);
 }
@@ -154,7 +154,7 @@ private:
         Vec3f n;
         bool is_flat;  ///< the triangle's own
     };
-    /// Where the file gives none (or none that can be used), the triangle's own.
+    /// The corner's normal; where the file gives none that can be used, the triangle's own.
     [[nodiscard]] Normal normal_of(const TriangleSoup::Corner& c, const Vec3f& flat) const {
         if (soup_.normals.empty()) return {{}, false};
         if (c.normal == TriangleSoup::kNone) return {flat, true};
@@ -171,7 +171,7 @@ private:
     }
 
     static constexpr std::uint32_t kUnknown = 0xffff'ffffu;
-    /// The vertex that the last triangle used at a position: most others there share it.
+    /// Cache: the last vertex used at a position, which most other triangles there share.
     struct Last {
         std::uint32_t point = kUnknown, uv = 0, normal = 0, vertex = kUnknown;
     };

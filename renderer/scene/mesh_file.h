@@ -14,7 +14,7 @@ namespace narpa {
 
 /// Of narpa-mesh-reader, the process that reads all formats but OBJ.
 struct MeshReaderLimits {
-    std::uint64_t memory_bytes = std::uint64_t{4} << 30;  ///< of the process; of what it sends, too
+    std::uint64_t memory_bytes = std::uint64_t{4} << 30;  ///< of the process, and of the data that it sends
     int seconds = 60;                                     ///< wall time
 };
 

@@ -30,7 +30,7 @@ Material polished(std::string name, const Rgb& reflectance, const Rgb& emission)
     return m;
 }
 
-/// The kinds of `illum` that the MTL specification gives glass, and ray-traced reflection without it.
+/// The values of `illum` for glass in the MTL specification, and those for ray-traced reflection without glass.
 bool is_glass(int illum) {
     return illum == 4 || illum == 6 || illum == 7 || illum == 9;
 }

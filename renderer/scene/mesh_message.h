@@ -45,7 +45,7 @@ bool plain(Stream& stream, T& x) {
     return stream.bytes(&x, sizeof x);
 }
 
-/// A receiver's memory grows with what arrives, not with what the length promises.
+/// A receiver allocates memory as data arrive, not by the announced length.
 template <class Stream, class Array>
 bool array(Stream& stream, Array& v) {
     using T = typename Array::value_type;

@@ -1,5 +1,5 @@
-/// renderer/scene/mesh_process.h - mesh files read in a process of their own, narpa-mesh-reader: a damaged file may
-/// crash it, and nothing else.
+/// renderer/scene/mesh_process.h - mesh files read in a process of their own, narpa-mesh-reader: a damaged file can
+/// crash only that process.
 #pragma once
 
 #include <string>

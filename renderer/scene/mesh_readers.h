@@ -38,7 +38,8 @@ inline constexpr std::size_t kMaxMaterials = 65535;
 /// In small letters, with its dot: ".obj".
 std::string extension_of(const std::string& path);
 
-/// The file that a material names, looked for as written and then by its last part beside the mesh.
+/// The path of a file that a material names: as written, or, if there is none, by its last part in the folder of
+/// the mesh.
 std::string texture_path(const std::string& mesh_path, std::string name);
 
 /// Wavefront OBJ (Alias/Wavefront, Advanced Visualizer manual, appendix B1). Our own reader, because Assimp 5.2
@@ -75,13 +76,13 @@ MeshMaterial from_mtl(const MtlMaterial& given);
 
 /// Lambert, or Phong where ks > 0; every band clamped to [0, 1] and both scaled so that kd + ks <= 1.
 Material diffuse_and_lobe(std::string name, Rgb kd, Rgb ks, float exponent, const Rgb& emission);
-/// Every number made what scene.h allows.
+/// Clamps every number to its range in scene.h.
 Material metallic_roughness(std::string name, const Rgb& base_colour, float metallic, float roughness, float ior,
                             const Rgb& emission);
 Material smooth_glass(std::string name, float ior, const Rgb& emission);
 
 /// Polygons of more corners are refused by the readers: the work is cubic in the worst case.
-inline constexpr std::size_t kMostCorners = 1024;
+inline constexpr std::size_t kMaxCorners = 1024;
 
 /// Cuts a simple polygon, convex or not, into corners.size() - 2 triangles of the same winding, as indices into
 /// `corners`. A convex one becomes a fan about its first corner; others lose one ear after the other.

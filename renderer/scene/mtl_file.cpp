@@ -153,7 +153,7 @@ private:
         }
     }
 
-    /// Hands on the material that ends here.
+    /// Stores the finished material.
     void finish() {
         if (!given_) return;
         MeshMaterial m = from_mtl(*given_);

@@ -97,8 +97,8 @@ private:
             if (!read_corner(token)) return false;
         const std::size_t count = corners_.size() - first;
         if (count < 3) return fail(keyword, fmt::format("a face of {} corners, expected at least 3", count));
-        if (count > kMostCorners)
-            return fail(keyword, fmt::format("a face of {} corners, expected at most {}", count, kMostCorners));
+        if (count > kMaxCorners)
+            return fail(keyword, fmt::format("a face of {} corners, expected at most {}", count, kMaxCorners));
         if (!material_) material_ = material_number(kNoMaterial);
         polygons_.push_back({first, count, *material_});
         return true;
@@ -148,7 +148,7 @@ private:
         return part == &Corner::uv ? "texture coordinates (vt)" : "normals (vn)";
     }
 
-    /// Indices of what had not been read yet are good when it came later.
+    /// Checks indices of elements that had not been read yet when they were used.
     bool check_forward_references() {
         for (const Reference& r : forward_)
             if (const std::size_t have = count_of(r.part); r.index > static_cast<std::int64_t>(have))

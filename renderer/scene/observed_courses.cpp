@@ -8,7 +8,8 @@
 namespace narpa {
 namespace {
 
-/// Of central differences: 1e-7 m/s of rounding, 1e-5 m/s of the third derivative in a low orbit.
+/// Step of central differences: errors of 1e-7 m/s by rounding, and of 1e-5 m/s by the third derivative in a low
+/// orbit.
 constexpr double kStep_s = 0.05;
 
 class OrbitCourse final : public Course {
@@ -50,7 +51,7 @@ private:
     Body body_;
 };
 
-/// `Direction`: from an observer at a time, unit, world.
+/// `Direction`: functor that returns the direction from an observer at a time, unit, world.
 template <class Direction>
 class CameraCourse final : public Course {
 public:

@@ -1,4 +1,4 @@
-/// renderer/scene/observed_courses.h - courses of what is seen from the ground, and of cameras that follow it.
+/// renderer/scene/observed_courses.h - courses of bodies seen from the ground, and of cameras that follow them.
 #pragma once
 
 #include <memory>
@@ -19,10 +19,10 @@ struct Observing {
 /// The apparent place of a body: in the direction in which it is seen, at its distance.
 [[nodiscard]] std::shared_ptr<const Course> apparent_course(const Observing& observing, Body body);
 
-/// A camera at the observer's place, its image's right side level.
+/// A camera at the observer's place, with its x axis horizontal.
 [[nodiscard]] std::shared_ptr<const Course> camera_towards_sun(const Observing& observing);
 [[nodiscard]] std::shared_ptr<const Course> camera_towards(const Observing& observing, Body body);
-/// Azimuth from north by east.
+/// Azimuth from north, positive towards east.
 [[nodiscard]] std::shared_ptr<const Course> camera_towards(const Observing& observing, double azimuth_rad,
                                                            double elevation_rad);
 

@@ -23,7 +23,7 @@ Vec3 aberrated(const Vec3& direction, const Vec3& velocity_m_s) {
     return normalized(direction + velocity_m_s / kLightSpeed);
 }
 
-/// Above the observer, with the lapse of the standard atmosphere.
+/// The air above the observer, with the lapse rate of the standard atmosphere.
 std::shared_ptr<const RefractiveShells> shells_above(const ObserverPlace& place) {
     double fixed[3];
     eraGd2gc(kWgs84, place.longitude_rad, place.latitude_rad, place.height_m, fixed);

@@ -1,4 +1,4 @@
-/// renderer/scene/observer.h - an observer on the Earth, what stands where in their sky, and bodies in orbit.
+/// renderer/scene/observer.h - an observer on the Earth, apparent directions, and bodies in orbit.
 ///
 /// World frame: GCRS, metres from the Earth's centre. Earth orientation is IAU 2006/2000A by ERFA, without polar
 /// motion (0.6 arcsec at most).
@@ -41,7 +41,7 @@ public:
                                           bool refracted = true) const;
     /// The Sun: with its parallax, and the aberration of the Earth's motion as well.
     [[nodiscard]] Vec3 apparent_sun(bool refracted = true) const;
-    /// Raises a direction by refraction: of an object at this distance above the air, infinite at first.
+    /// Raises a direction by refraction, for an object above the air at this distance (or infinity).
     [[nodiscard]] Vec3 refracted(const Vec3& direction, double range_m) const;
 
 private:

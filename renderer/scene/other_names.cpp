@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-/// So that "FOV_deg" and "fovDeg" are one.
+/// Normalises a name, so that "FOV_deg" and "fovDeg" are equal.
 std::string plain(std::string_view name) {
     std::string text;
     for (const char c : name)

@@ -19,9 +19,9 @@ namespace {
 using Image = std::shared_ptr<PointSpreadImage>;
 
 Result<Image> image_of_size(const std::string& path, std::int64_t width, std::int64_t height) {
-    if (width < 1 || height < 1 || width > kMostPointSpreadSamples || height > kMostPointSpreadSamples)
+    if (width < 1 || height < 1 || width > kMaxPointSpreadSamples || height > kMaxPointSpreadSamples)
         return Error{.what = fmt::format("an image of {} x {} samples, expected at most {} x {}", width, height,
-                                         kMostPointSpreadSamples, kMostPointSpreadSamples),
+                                         kMaxPointSpreadSamples, kMaxPointSpreadSamples),
                      .file = path};
     auto image = std::make_shared<PointSpreadImage>();
     image->width = static_cast<int>(width), image->height = static_cast<int>(height);

@@ -17,7 +17,7 @@ constexpr std::array<std::pair<std::string_view, int>, 1> kSkies{{{"hosek-wilkie
 constexpr Range kTurbidity{.low = 1, .high = 10};
 constexpr Range kAirHeight{.low = 100, .high = 1e5};
 
-/// Of the sphere that has the body's volume; nullopt: a shape without one.
+/// Radius of the sphere with the body's volume; nullopt for a mesh.
 std::optional<double> mean_radius_m(const Body& body) {
     if (const auto* s = std::get_if<Sphere>(&body.shape)) return s->radius_m;
     if (const auto* e = std::get_if<Ellipsoid>(&body.shape))
@@ -36,7 +36,7 @@ int planet_body(TableReader& table, const std::vector<Body>& bodies) {
     return -1;
 }
 
-/// Will it be textured? The files of textures are opened after everything else.
+/// Whether the material names a texture. Texture files are opened after everything else.
 bool names_texture(const SceneReading& reading, int material) {
     return std::any_of(reading.textures.begin(), reading.textures.end(),
                        [&](const NamedTexture& t) { return t.material == material; });

@@ -99,7 +99,7 @@ void read_rotation(TableReader& table, Motion& motion, const SceneReading& readi
     if (!name) return;
     for (const char* key : {"attitude_wxyz", "rate_rad_s"}) table.refuse(key, "follows from rotation");
     if (!reading.has_epoch) table.fail("rotation", "expected an epoch in [scene], at which the body stands");
-    if (const auto turning = turning_of(*name, reading.scene.epoch_unix_ns)) {
+    if (const auto turning = body_rotation_of(*name, reading.scene.epoch_unix_ns)) {
         motion.T_world_body.q = turning->q_icrs_body;
         motion.rate_rad_s = turning->rate_rad_s;
         return;

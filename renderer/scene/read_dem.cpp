@@ -15,7 +15,7 @@ namespace {
 
 constexpr Range kDemFactor{.low = -1e9, .high = 1e9};
 constexpr Range kDemLength{.low = 0, .high = 1e9, .low_open = true};
-constexpr std::size_t kMostPathPoints = 256;
+constexpr std::size_t kMaxPathPoints = 256;
 constexpr double kPixelsPerRadWithoutCamera = 1000;
 
 constexpr std::array<std::pair<std::string_view, DemRequest::On>, 3> kGrounds{
@@ -27,7 +27,7 @@ constexpr std::array<std::pair<std::string_view, bool>, 2> kHeightKinds{{{"heigh
 TerrainDetail read_detail(TableReader& table) {
     TerrainDetail d;
     table.require("posts", "how many times finer than the DEM, 2 to 64");
-    d.posts_per_post = static_cast<int>(table.integer("posts", 2, 64).value_or(2));
+    d.refinement_factor = static_cast<int>(table.integer("posts", 2, 64).value_or(2));
     // From 2.4 on, cells would hold more craters than DetailedSource draws.
     d.craters = table.number("craters_per_m2", {.low = 0, .high = 1}).value_or(0);
     d.rocks = table.number("rocks_share", {.low = 0, .high = 0.5}).value_or(0);
@@ -48,11 +48,11 @@ std::vector<Vec3> read_seen_from(TableReader& table, std::string_view key) {
             point[static_cast<int>(k)] = p->get(k)->value<double>().value_or(NAN);
         path.push_back(point);
     }
-    const bool good = !path.empty() && path.size() <= kMostPathPoints &&
+    const bool good = !path.empty() && path.size() <= kMaxPathPoints &&
                       std::all_of(path.begin(), path.end(), [](const Vec3& p) { return norm(p) < 1e15; });
     if (good) return path;
     table.fail(key, fmt::format("expected [[x, y, z], ...], 1 to {} points in metres in the body's frame",
-                                kMostPathPoints));
+                                kMaxPathPoints));
     return {};
 }
 
@@ -95,7 +95,7 @@ std::vector<Vec3> places_of_sensors(const Scene& scene, std::size_t body) {
     return places;
 }
 
-/// In the corner of the image, where a pinhole has most.
+/// Pixels per radian in the corner of the image, where a pinhole has most.
 double pixels_per_rad(const Camera& c) {
     const double f = std::max(c.fx, c.fy), x = std::max(c.cx, c.width - 1 - c.cx) / c.fx,
                  y = std::max(c.cy, c.height - 1 - c.cy) / c.fy;

@@ -17,11 +17,11 @@ constexpr Range kLength{.low = 0, .high = 1e3};
 
 void read_beam(TableReader& table, LidarReceiverModel& r) {
     r.beam_divergence_rad = table.number("beam_divergence_rad", {.low = 0, .high = 0.1}).value_or(0);
-    r.sub_rays = static_cast<int>(table.integer("sub_rays", 1, LidarReceiverModel::kMostSubRays)
-                                      .value_or(r.beam_divergence_rad > 0 ? 32 : 1));
-    if (r.sub_rays > 1 && r.sub_rays < LidarReceiverModel::kLeastSubRays)
+    r.sub_rays = static_cast<int>(
+        table.integer("sub_rays", 1, LidarReceiverModel::kMaxSubRays).value_or(r.beam_divergence_rad > 0 ? 32 : 1));
+    if (r.sub_rays > 1 && r.sub_rays < LidarReceiverModel::kMinSubRays)
         table.fail("sub_rays", fmt::format("{} is too few, expected 1, or {} to {}", r.sub_rays,
-                                           LidarReceiverModel::kLeastSubRays, LidarReceiverModel::kMostSubRays));
+                                           LidarReceiverModel::kMinSubRays, LidarReceiverModel::kMaxSubRays));
     if (r.sub_rays > 1 && r.beam_divergence_rad == 0)
         table.require("beam_divergence_rad", "a number > 0, as sub_rays sample the beam's cone");
     r.pulse_length_m = table.number("pulse_length_m", kLength).value_or(r.pulse_length_m);
@@ -56,7 +56,7 @@ LidarReceiverModel read_receiver(TableReader& table) {
     return r;
 }
 
-/// One of those that narpa knows, or one that a file describes.
+/// A make built into narpa, or one that a file describes.
 LidarMake read_make(TableReader& table, const std::filesystem::path& folder) {
     std::vector<std::pair<std::string_view, const LidarMake*>> makes;
     for (const LidarMake* make : lidar_makes()) makes.emplace_back(make->name, make);
@@ -85,7 +85,7 @@ LidarPps read_pps(TableReader& table) {
     return table.choice<LidarPps>("pps", kStates).value_or(locked);
 }
 
-/// Formats of packets, columns, the maker's own calibration file: for makes that have them.
+/// Reads packet profile, columns and the maker's calibration file, for makes that have them.
 void read_mode(TableReader& table, const LidarMake& make, const std::filesystem::path& folder,
                LidarSettings& settings) {
     if (!table.has("rate_hz")) settings.rate_hz = 0;
@@ -143,7 +143,7 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
     lidar.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);
     lidar.mount = mounting.mount;
-    lidar.T_mount_lidar = mounting.T_mount_thing;
+    lidar.T_mount_lidar = mounting.T_mount_sensor;
     const LidarMake make = read_make(table, folder);
     lidar.model = make.configure(read_settings(table, make, folder));
     const double range_m_most = lidar.model->spec().range_m_max;

@@ -66,7 +66,7 @@ Light read_light(TableReader& table, std::vector<std::string>& names, const std:
     read_size(table, light);
     const Mounting mounting = read_mounting(table, bodies, camera_attitude);
     light.mount = mounting.mount;
-    light.T_mount_light = mounting.T_mount_thing;
+    light.T_mount_light = mounting.T_mount_sensor;
     table.finish();
     return light;
 }

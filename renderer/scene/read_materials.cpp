@@ -142,7 +142,7 @@ void read_textures(TableReader& table, Material& m, SceneReading& reading) {
     if (table.has("height_texture")) table.require("bump_height_m", "a number: how high white stands above black");
 }
 
-/// Everything but the kind.
+/// Reads everything but the kind.
 void read_parameters(TableReader& table, Material& m, SceneReading& reading) {
     table.refuse_keys_of_other_kinds(name_of(m.kind, kMaterialKinds), kKindKeys);
     m.diffuse = table.rgb("albedo", kUnit).value_or(m.diffuse);

@@ -51,9 +51,9 @@ Quat lidar_attitude(const Vec3& forward, const Vec3& right) {
 Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of) {
     Mounting m;
     m.mount = read_mount(table, bodies);
-    m.T_mount_thing.t = table.vec3("position_m").value_or(Vec3{});
-    m.T_mount_thing.q = table.attitude("attitude_wxyz").value_or(Quat{});
-    read_look_at(table, m.T_mount_thing, attitude_of);
+    m.T_mount_sensor.t = table.vec3("position_m").value_or(Vec3{});
+    m.T_mount_sensor.q = table.attitude("attitude_wxyz").value_or(Quat{});
+    read_look_at(table, m.T_mount_sensor, attitude_of);
     return m;
 }
 

@@ -25,7 +25,7 @@ ObserverPlace read_place(TableReader& table) {
     return place;
 }
 
-/// An observer on the ellipsoid of the Earth is above its surface in spite of rounding, which is nanometres.
+/// Keeps an observer above the surface of the Earth's ellipsoid in spite of rounding errors of nanometres.
 void stand_on_earth(TableReader& table, ObserverPlace& place) {
     constexpr double kAbove_m = 1e-3;
     if (!table.has("earth")) return;
@@ -33,7 +33,7 @@ void stand_on_earth(TableReader& table, ObserverPlace& place) {
     place.height_m = std::max(place.height_m, kAbove_m);
 }
 
-/// The Earth's ellipsoid turns with it.
+/// Gives the body of the Earth its attitude and rate.
 void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<Body>& bodies) {
     const auto name = table.text("earth");
     if (!name) return;

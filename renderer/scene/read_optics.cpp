@@ -9,8 +9,8 @@
 namespace narpa {
 namespace {
 
-/// Thin lens, by the diameter of its aperture or by its focal length and the camera's f-number: the detector's,
-/// which takes the lens's where it has none of its own.
+/// Thin lens, by the diameter of its aperture, or by its focal length and the camera's f-number. If only the lens
+/// states the f-number, the detector takes it.
 std::optional<Lens> read_lens(TableReader& camera, std::optional<Detector>& detector) {
     auto table = camera.table("lens");
     if (!table) return std::nullopt;
@@ -46,7 +46,7 @@ std::optional<Lens> read_lens(TableReader& camera, std::optional<Detector>& dete
     return lens;
 }
 
-/// The image of a point, whose samples reach no farther from its centre than the filter does.
+/// Reads the image of a point spread function, whose samples must be within the reach of the filter.
 void read_point_spread_keys_of_image(TableReader& table, PointSpreadFunction& spread,
                                      const std::filesystem::path& folder) {
     const auto name = table.text("image");

@@ -88,7 +88,7 @@ void read_calibration_key(TableReader& table, Camera& camera, const std::filesys
 
 void read_resolution(TableReader& table, Camera& camera) {
     if (!table.has("calibration")) table.require("resolution", "[width, height] in pixels");
-    if (const auto size = table.size("resolution", kMostPixelsPerSide))
+    if (const auto size = table.size("resolution", kMaxPixelsPerSide))
         camera.width = (*size)[0], camera.height = (*size)[1];
 }
 

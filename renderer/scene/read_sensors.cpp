@@ -93,7 +93,7 @@ double rows_s(const Camera& c, const std::optional<Shutter>& shutter) {
     return shutter ? 1e-9 * static_cast<double>(shutter->row_time_ns) * (c.height - 1) : 0;
 }
 
-/// Pictures over time need an exposure, which the detector has.
+/// A shutter needs an exposure time, which the detector states.
 std::optional<Shutter> read_shutter(TableReader& camera, const Camera& c) {
     enum class Kind : std::uint8_t { global, rolling };
     static constexpr std::array<std::pair<std::string_view, Kind>, 2> kKinds{
@@ -134,7 +134,7 @@ std::optional<CameraControlLimits> read_control(TableReader& camera, const Camer
         return static_cast<std::int64_t>(std::llround(table->number(key, range).value_or(otherwise_s) * 1e9));
     };
     const double exposure_s = c.detector->exposure_s;
-    // At least a millisecond: the thread of the bus may be so late.
+    // At least a millisecond: the bus thread may be that late.
     control.latency_ns = ns("latency_s", {.low = 1e-3, .high = 10}, 0.01);
     control.trigger = table->choice<TriggerMode>("trigger", kModes).value_or(control.trigger);
     control.exposure_min_ns = ns("exposure_min_s", {.low = 1e-9, .high = exposure_s}, std::min(1e-5, exposure_s));
@@ -148,14 +148,14 @@ std::optional<CameraControlLimits> read_control(TableReader& camera, const Camer
     return control;
 }
 
-/// What an ideal sensor maps to full scale: a white Lambert surface that faces the Sun, or the brightest band of
-/// the ambient light where there is no Sun. 0: neither is there.
+/// The radiance that an ideal sensor maps to full scale: that of a white Lambert surface that faces the Sun or,
+/// without a Sun, of the brightest band of the ambient light. 0 if there is neither.
 double white_radiance(const Scene& scene) {
     if (scene.sun) return scene.sun->irradiance_w_m2 / kPi;
     return std::max({scene.ambient.x, scene.ambient.y, scene.ambient.z});
 }
 
-/// Keys of the detector that are easily put beside it.
+/// Refuses keys of the detector in [[camera]], a likely mistake.
 void refuse_keys_of_detector(TableReader& camera) {
     for (const char* key :
          {"exposure_s", "exposure_stops", "pixel_pitch_m", "f_number", "quantum_efficiency", "full_well_e",
@@ -163,14 +163,14 @@ void refuse_keys_of_detector(TableReader& camera) {
         camera.refuse(key, "belongs to the camera's detector, expected it in [camera.detector]");
 }
 
-/// Tables of a camera that stand alone.
+/// Refuses tables of a camera at the top level.
 void refuse_tables_of_camera(TableReader& root) {
     for (const char* key :
          {"detector", "shutter", "control", "intrinsics", "distortion", "lens", "psf", "vignetting", "ghost"})
         root.refuse(key, fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key));
 }
 
-/// A thin lens has a plane of focus, which rays at right angles to its axis do not meet.
+/// Refuses thin lenses with a wide field: rays at right angles to the axis do not meet the plane of focus.
 void refuse_wide_field(TableReader& table, const Camera& camera) {
     constexpr double kWidest_deg = 80;
     const Pinhole pinhole(camera.fx, camera.fy, camera.cx, camera.cy);
@@ -190,7 +190,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, camera_attitude);
     camera.mount = mounting.mount;
-    camera.T_mount_camera = mounting.T_mount_thing;
+    camera.T_mount_camera = mounting.T_mount_sensor;
     read_tracking(table, reading, camera);
     read_projection(table, camera, folder);
     camera.period_ns = read_period_ns(table, camera.period_ns);

@@ -10,7 +10,7 @@ constexpr double kJ2000 = 2000;
 constexpr Range kYears{.low = 1000, .high = 3000};  // straight proper motion is good to an arcminute here
 constexpr double kFastest_m_s = 2.9e8;              // below the speed of light
 
-/// An error at a line of the catalogue keeps its place there.
+/// An error at a line of the catalogue keeps its location; others get that of the scene file.
 Error blamed(Error error, const toml::source_region& place, const std::string& scene_file) {
     if (error.line == 0)
         return {.what = "catalogue: " + error.text(),

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kMaxBudgetMs = 1e6;
 constexpr std::int64_t kMaxBudgetRays = 1'000'000'000'000;
-constexpr int kFirstYear = 1900, kLastYear = 2100;  // where ERFA's Earth is good, and int64 nanoseconds hold
+constexpr int kFirstYear = 1900, kLastYear = 2100;  // range of ERFA's Earth ephemeris and of int64 nanoseconds
 
 std::int64_t unix_ns_from(const toml::date_time& t) {
     using namespace std::chrono;
@@ -45,7 +45,7 @@ std::optional<toml::date_time> date_of(const toml::node& node) {
 }
 
 double julian_year(std::int64_t unix_ns) {
-    constexpr double kJ2000_s = 946'728'000, kYear_s = 365.25 * 86400;  // seconds of leap do not matter here
+    constexpr double kJ2000_s = 946'728'000, kYear_s = 365.25 * 86400;  // leap seconds do not matter here
     return 2000 + (1e-9 * static_cast<double>(unix_ns) - kJ2000_s) / kYear_s;
 }
 
@@ -129,7 +129,7 @@ void read_render(TableReader& root, Scene& scene) {
     read_budget(*table, render);
     render.seed = static_cast<std::uint64_t>(table->integer("seed", 0, INT64_MAX).value_or(0));
     render.stale_after_s = table->number("stale_after_s", kPositive).value_or(render.stale_after_s);
-    // The wire's times are unambiguous within 39 h.
+    // Time stamps on the bus are unambiguous within 39 h.
     render.command_ahead_max_s =
         table->number("command_ahead_max_s", {.low = 0.001, .high = 140'000}).value_or(render.command_ahead_max_s);
     table->finish();

@@ -1,5 +1,5 @@
-/// renderer/scene/reader_process.h - a program of ours that reads a file of others within limits of memory and time
-/// and writes what it found to a pipe: a damaged file may crash it, and nothing else.
+/// renderer/scene/reader_process.h - runs a narpa program that reads an untrusted file within limits of memory and
+/// time and writes the result to a pipe: a damaged file can crash only that process.
 #pragma once
 
 #include <sys/types.h>
@@ -19,9 +19,10 @@ public:
     ReaderProcess& operator=(const ReaderProcess&) = delete;
     ~ReaderProcess();
 
-    /// Starts the program, which is beside the running one or on PATH. 0, or the errno of why it cannot be started.
+    /// Starts the program, which is beside the running one or on PATH. Returns 0, or an errno if it cannot be
+    /// started.
     int start(const std::string& program, std::vector<std::string> arguments);
-    /// Ends it; its wait status. One that had closed its pipe by ending keeps the status that it ended with.
+    /// Kills the process and returns its wait status. A process that has already exited keeps its own status.
     int end();
     [[nodiscard]] int output() const { return out_; }
 
@@ -30,13 +31,13 @@ private:
     int out_ = -1, status_ = 0;
 };
 
-/// Bytes of a pipe, until a time and up to a number.
+/// Reads bytes of a pipe, until a deadline and up to a limit.
 class PipeReceiver {
 public:
     static constexpr bool kReceives = true;
 
-    PipeReceiver(int fd, std::uint64_t most_bytes, int seconds)
-        : fd_(fd), left_(most_bytes), deadline_(Clock::now() + std::chrono::seconds(seconds)) {}
+    PipeReceiver(int fd, std::uint64_t max_bytes, int seconds)
+        : fd_(fd), left_(max_bytes), deadline_(Clock::now() + std::chrono::seconds(seconds)) {}
 
     bool bytes(void* data, std::size_t size);
     [[nodiscard]] bool timed_out() const { return timed_out_; }
@@ -52,7 +53,8 @@ private:
     bool timed_out_ = false;
 };
 
-/// What ended a process that had not sent all: "the mesh reader crashed (signal 11)". `reader` as here.
+/// Why a process ended before it had sent everything: "the mesh reader crashed (signal 11)". `reader`: "the mesh
+/// reader".
 [[nodiscard]] std::string why_it_ended(const std::string& reader, int status, std::uint64_t memory_bytes);
 
 }  // namespace narpa

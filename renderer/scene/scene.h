@@ -1,7 +1,7 @@
 /// renderer/scene/scene.h - bodies, lights, sensors and settings as plain data: the result of reading a scene file.
 ///
-/// SI units; world frame right-handed and inertial. What a scene file does not name is not here (empty vector,
-/// empty optional), costs nothing, and is decided once, before the first frame.
+/// SI units; world frame right-handed and inertial. Features that a scene file does not name are absent (empty
+/// vector, empty optional) and cost nothing; this is decided once, before the first frame.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ struct Mesh {
     std::vector<std::array<std::uint32_t, 3>> faces;  ///< counter-clockwise seen from outside
     std::vector<std::uint16_t> face_material;         ///< per face, index into Scene::materials
     Vec3 origin_m{};                                  ///< of the positions, in the body's frame
-    bool height_field = false;                        ///< a terrain: open, whatever its edges say
+    bool height_field = false;                        ///< a terrain: counts as open, whatever its edges
 };
 
 struct Sphere {
@@ -52,11 +52,11 @@ struct Body {
     std::string name;
     std::variant<int, Sphere, Ellipsoid> shape;  ///< index into Scene::meshes, or an exact shape
     Motion initial{};                            ///< at time 0
-    std::shared_ptr<const Course> course{};      ///< null: straight on from there
+    std::shared_ptr<const Course> course{};      ///< null: constant velocity and rate from `initial`
     std::optional<std::uint32_t> can_id{};       ///< base identifier of its pose commands on CAN
 };
 
-/// Of a body without commands.
+/// Motion of a body without commands.
 [[nodiscard]] inline Motion motion_at(const Body& body, double t_s) {
     return body.course ? body.course->at(t_s) : extrapolate(body.initial, t_s);
 }
@@ -73,7 +73,7 @@ struct Star {
     double v_magnitude = 0, b_v = 0.65;  ///< Johnson V and B - V
 };
 
-/// What lies behind everything, and where the world frame stands in it.
+/// The stars in the background, and the attitude and velocity of the world frame among them.
 struct StarField {
     std::vector<Star> stars;
     Quat q_icrs_world{};  ///< at simulation time 0
@@ -103,7 +103,7 @@ struct Light {
 /// Photons to digital numbers. Absent: an ideal sensor without noise (see Camera::white_radiance). Amounts of 0 and
 /// switches that are false are exactly off.
 struct Detector {
-    double exposure_s = 0.01;  ///< its stops included
+    double exposure_s = 0.01;  ///< exposure stops included
     double pixel_pitch_m = 5e-6;
     double f_number = 4;
     double quantum_efficiency = 0.5;  ///< electrons per photon
@@ -116,8 +116,8 @@ struct Detector {
 
     double dark_current_e_s = 0;  ///< mean of a pixel, at dark_reference_c
     double temperature_c = 20, dark_reference_c = 20;
-    double dark_doubling_c = 7;  ///< K by which dark current doubles
-    double prnu = 0;             ///< standard deviation of the pixels' gains, of their mean: EMVA's PRNU_1288
+    double dark_doubling_c = 7;  ///< temperature step, K, that doubles the dark current
+    double prnu = 0;             ///< relative standard deviation of the pixels' gains: EMVA's PRNU_1288
     double dsnu_e = 0;           ///< standard deviation of the pixels' offsets: EMVA's DSNU_1288
     double dead_pixel_share = 0;
     double hot_pixel_share = 0, hot_pixel_e_s = 0;      ///< dark current added, at dark_reference_c
@@ -127,13 +127,14 @@ struct Detector {
     double sensitive_depth_m = 1e-5;  ///< of the silicon that collects a cosmic ray's charge
 };
 
-/// Thin lens: what is not at the focus distance is blurred to a circle of aperture * fx * |1/focus - 1/z| pixels.
+/// Thin lens: a point off the focus distance, at depth z, is blurred to a circle of aperture * fx * |1/focus - 1/z|
+/// pixels.
 struct Lens {
     double aperture_diameter_m = 0;
     double focus_distance_m = 0;  ///< from the lens, along z; infinite is allowed
 };
 
-/// When the rows of an image are exposed. Without it every frame is a picture of one moment, mid-exposure.
+/// When the rows of an image are exposed. Without it every frame shows one instant, mid-exposure.
 struct Shutter {
     std::int64_t row_time_ns = 0;  ///< from the start of one row's exposure to the next one's; 0: a global shutter
 };
@@ -145,13 +146,13 @@ struct CameraControlLimits {
     std::int64_t exposure_min_ns = 10'000, exposure_max_ns = 0;
     std::int16_t gain_max_cdb = 2400;
     bool auto_exposure = false;  ///< at the start
-    double level = 0.3;          ///< that auto-exposure aims at: mean of the image, share of full scale
+    double level = 0.3;          ///< target of auto-exposure: mean of the image, share of full scale
 };
 
-/// Pixels from a point that the filter of a point spread function reaches at most.
+/// Largest reach of the filter of a point spread function, pixels.
 inline constexpr int kPointSpreadReach_px = 31;
 
-/// What a lens makes of a point, as samples that sum to 1, row by row.
+/// Point spread function of a lens as samples that sum to 1, row by row.
 struct PointSpreadImage {
     int width = 0, height = 0;
     double centre_x = 0, centre_y = 0;  ///< where a pinhole images the point; the first sample is at (0, 0)
@@ -166,17 +167,17 @@ struct PointSpreadFunction {
     double samples_per_px = 1;  ///< of the image
 };
 
-/// An image of the aperture in the Sun's light, by two reflections in the lens; renderer/camera/sun_ghost.h.
+/// Lens ghost: an image of the aperture in the Sun's light, by two reflections in the lens;
+/// renderer/camera/sun_ghost.h.
 struct Ghost {
-    double strength = 0;  ///< of the Sun's light that enters the aperture
+    double strength = 0;  ///< share of the Sun's light that enters the aperture
     double radius_px = 1;
     double scale = 1;       ///< distance from the principal point over that of the Sun's image, on the other side
     double within_rad = 0;  ///< angle of the Sun from the optical axis, below a right angle
 };
 
-/// The share of light at theta radians from the optical axis: cos^4 theta, if asked for, times 1 + a theta^2 + b
-/// theta^4
-/// + c theta^6.
+/// The share of light at theta radians from the optical axis: cos^4 theta (if `cos4`) times 1 + a theta^2 + b
+/// theta^4 + c theta^6.
 struct Vignetting {
     bool cos4 = false;
     std::array<double, 3> polynomial{};  ///< a, b, c
@@ -208,34 +209,33 @@ struct Camera {
     std::optional<Ghost> ghost{};
 };
 
-/// What a LiDAR's receiver makes of the light that comes back. As it stands here: the exact range of the beam's
-/// axis, always detected. Strengths of echoes are relative to the least that is detected.
+/// Model of a LiDAR's receiver. With the default values it reports the exact range along the beam's axis, always
+/// detected. Strengths of echoes are relative to the detection threshold.
 struct LidarReceiverModel {
     double beam_divergence_rad = 0;  ///< full angle of the evenly lit cone of the beam
-    int sub_rays = 1;                ///< that sample the cone: 1, or kLeastSubRays to kMostSubRays
+    int sub_rays = 1;                ///< number of rays that sample the cone: 1, or kMinSubRays to kMaxSubRays
     double pulse_length_m = 0.9;     ///< surfaces closer in range than this make one echo: c / 2 * duration
     enum class Multipath : std::uint8_t {
         none,
         mirrors,  ///< a beam goes on from mirrors
-        diffuse,  ///< and what it lights lights the surfaces around
+        diffuse,  ///< as mirrors, and light from one surface to another
     };
     Multipath multipath = Multipath::none;
 
     double range_min_m = 0;            ///< echoes from nearer are lost
     double range_at_10_percent_m = 0;  ///< where a surface of 10 %, across the beam, is just detected; 0: no limit
-    double detection_snr = 0;          ///< of an echo that is just detected: half of those are; 0: a sharp limit
-    double sunlight_noise = 0;  ///< variance of the receiver's noise that a white surface in full sunlight adds, of
-                                ///< that in the dark
+    double detection_snr = 0;          ///< of an echo at the threshold, detected half of the time; 0: a sharp limit
+    double sunlight_noise = 0;  ///< noise variance added by a white surface in full sunlight, over that in the dark
 
     double range_bias_m = 0;
     double range_noise_m = 0;           ///< standard deviation
-    double range_noise_at_limit_m = 0;  ///< the same, of an echo that is just detected; falls with its strength
-    double range_walk_m = 0;            ///< by which an echo that is just detected is late; falls with its strength
+    double range_noise_at_limit_m = 0;  ///< the same at the threshold; proportional to 1 / strength
+    double range_walk_m = 0;            ///< range error at the threshold; proportional to 1 / strength
     double range_ambiguity_m = 0;       ///< ranges are modulo this, c / 2 * time between pulses; 0: they are not
     double velocity_noise_m_s = 0;      ///< standard deviation
     double velocity_ambiguity_m_s = 0;  ///< velocities are modulo this, about 0; 0: they are not
 
-    static constexpr int kLeastSubRays = 8, kMostSubRays = 64;
+    static constexpr int kMinSubRays = 8, kMaxSubRays = 64;
     friend bool operator==(const LidarReceiverModel&, const LidarReceiverModel&) = default;
 };
 
@@ -255,8 +255,8 @@ struct RenderSettings {
     };
     Method method = Method::direct;
     int max_depth = 8;              ///< path: surfaces that a path may meet, 1..40 (1 is direct light alone)
-    int spp = 1;                    ///< where there is no budget
-    std::int64_t budget_ns = 0;     ///< > 0: a frame is handed over within so long of its exposure's end
+    int spp = 1;                    ///< samples per pixel where there is no budget
+    std::int64_t budget_ns = 0;     ///< > 0: hand-over deadline of a frame, from the end of its exposure
     std::uint64_t budget_rays = 0;  ///< > 0: a frame takes at most so many rays of all kinds
     std::uint64_t seed = 0;
     double stale_after_s = 0.5;       ///< commands older than this: the body holds still and is reported stale

@@ -28,8 +28,8 @@ void read_root(TableReader& root, SceneReading& reading) {
     if (reading.problems.none()) load_named_files(reading);
 }
 
-/// Direct light is sampled towards its sources, and a mirror or a pane of glass sends on only what comes from one
-/// direction.
+/// Warns of mirrors and glass with direct lighting: it samples the light sources, and these materials scatter light
+/// from one direction only, so they look dark.
 void warn_of_dark_materials(Scene& scene) {
     std::string names;
     for (const Material& m : scene.materials)

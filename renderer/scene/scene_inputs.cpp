@@ -19,7 +19,7 @@ public:
         try {
             const auto table = parse_based_on(path.string(), head);
             if (table) add_node(*table, path.parent_path());
-        } catch (const toml::parse_error&) {  // left out
+        } catch (const toml::parse_error&) {  // files that do not parse are left out
         }
     }
     void add_file(const fs::path& path) {

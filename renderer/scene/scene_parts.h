@@ -92,7 +92,7 @@ int add_grey_material(const std::string& name, Scene& scene);
 
 struct Mounting {
     int mount = -1;  ///< body that carries it; -1 is the world
-    Rigid3 T_mount_thing{};
+    Rigid3 T_mount_sensor{};
 };
 
 /// A sensor's attitude from its boresight `forward` and its `right` axis: unit vectors, orthogonal, parent axes.

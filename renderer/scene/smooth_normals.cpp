@@ -7,7 +7,7 @@
 namespace narpa {
 namespace {
 
-/// Shorter sums, of faces that are back to back, have no direction.
+/// Shorter sums of normals, from faces back to back, have no usable direction.
 constexpr double kCancelled = 1e-6;
 
 struct FlatCorner {
@@ -33,7 +33,7 @@ std::vector<FlatCorner> flat_corners(const TriangleSoup& soup) {
     return out;
 }
 
-/// The usable corners, those of one position side by side.
+/// The usable corners, sorted by position.
 std::vector<std::size_t> by_position(const TriangleSoup& soup, const std::vector<FlatCorner>& flat) {
     std::vector<std::size_t> corners;
     for (std::size_t k = 0; k < flat.size(); ++k)
@@ -55,17 +55,17 @@ void add_smooth_normals(TriangleSoup& soup, double crease_rad) {
         return soup.triangles[k / 3].corners[k % 3];
     };
     const auto position = [&](std::size_t k) -> const Vec3& { return soup.positions[corner(k).position]; };
-    const double least_cosine = std::cos(crease_rad);
+    const double min_cosine = std::cos(crease_rad);
     for (auto first = corners.begin(); first != corners.end();) {
         const auto end = std::find_if(first, corners.end(), [&](std::size_t k) {
             const Vec3 &a = position(k), &b = position(*first);
             return a.x != b.x || a.y != b.y || a.z != b.z;
         });
         const auto count = static_cast<std::size_t>(end - first);
-        for (auto k = first; k != end && count <= kMostSmoothed; ++k) {
+        for (auto k = first; k != end && count <= kMaxSmoothed; ++k) {
             Vec3 sum{};
             for (auto other = first; other != end; ++other)
-                if (*other == *k || dot(flat[*k].normal, flat[*other].normal) > least_cosine)
+                if (*other == *k || dot(flat[*k].normal, flat[*other].normal) > min_cosine)
                     sum = sum + flat[*other].angle * flat[*other].normal;
             if (!(norm(sum) > kCancelled)) continue;
             corner(*k).normal = static_cast<std::uint32_t>(soup.normals.size());

@@ -17,7 +17,7 @@ namespace {
 
 using Colour = TextureUse::Colour;
 
-/// Code of `count` -> linear, 65535 = 1.0.
+/// Lookup table from code to linear light, 65535 = 1.0.
 using Table = std::vector<std::uint16_t>;
 
 template <class Curve>
@@ -38,7 +38,7 @@ double from_middle_at_128(double s) {
     return code <= 128 ? code / 256 : 0.5 + (code - 128) / 254;
 }
 
-/// Every code of these bits to linear light, made once.
+/// The lookup table for this bit depth, made once.
 const Table& table_for(int bits, Colour colour) {
     const int count = 1 << bits;
     if (colour == Colour::srgb || (colour == Colour::by_depth && bits == 8)) {
@@ -58,7 +58,7 @@ const Table& table_for(int bits, Colour colour) {
     return sixteen;
 }
 
-/// OpenCV keeps blue first.
+/// OpenCV stores blue first.
 template <class Sample>
 void copy_rgb(const cv::Mat& bgr, const Table& linear, std::uint16_t* out) {
     for (int y = 0; y < bgr.rows; ++y) {
@@ -85,8 +85,9 @@ Result<Texture> from_image(const std::string& name, const cv::Mat& bgr, const Te
     return texture;
 }
 
-/// The decoder makes the missing part grey. Segments (ITU-T T.81, B.1) up to the first scan have their length, and
-/// may hold a thumbnail; in scans no end of image is but the file's.
+/// Whether a JPEG has no end-of-image marker: the decoder would fill the missing part with grey. Segments (ITU-T
+/// T.81, B.1) before the first scan are skipped by their length, as they may hold a thumbnail; after that the
+/// marker can only be the file's own.
 bool is_jpeg_cut_short(std::span<const std::uint8_t> bytes) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if (!text.starts_with("\xFF\xD8\xFF")) return false;
@@ -106,9 +107,9 @@ Result<Texture> decode_texture(const std::string& name, std::span<const std::uin
         if (bytes.empty()) return Error{.what = "empty file, expected an image", .file = name};
         const std::optional<ImageSize> size = image_size(bytes);
         if (!size) return no_image;
-        if (size->width > kMostPixels || size->height > kMostPixels / size->width)
+        if (size->width > kMaxPixels || size->height > kMaxPixels / size->width)
             return Error{.what = fmt::format("an image of {} x {} pixels, expected at most {} of them", size->width,
-                                             size->height, kMostPixels),
+                                             size->height, kMaxPixels),
                          .file = name};
         if (is_jpeg_cut_short(bytes)) return Error{.what = "a JPEG without an end: it is cut short", .file = name};
         const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));

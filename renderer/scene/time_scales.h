@@ -5,7 +5,7 @@
 
 namespace narpa {
 
-/// The sum of both, in days; in two parts, as ERFA takes it, to keep nanoseconds.
+/// Julian date in days: the sum of two parts, as ERFA takes it, to resolve nanoseconds.
 struct JulianDate {
     double days = 0, fraction = 0;
 };

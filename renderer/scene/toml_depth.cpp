@@ -13,7 +13,7 @@ bool is_in_key(char c) {
            c == ' ' || c == '\t' || static_cast<unsigned char>(c) >= 0x80;
 }
 
-/// Where the text in quotes that begins at `from` ends. A text of one line ends with its line.
+/// The end of the quoted text that begins at `from`. A single-line text ends with its line at the latest.
 std::size_t end_of_quotes(std::string_view text, std::size_t from) {
     const char quote = text[from];
     const std::string three(3, quote);

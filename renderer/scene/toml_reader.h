@@ -52,7 +52,7 @@ private:
 struct Range {
     double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
     bool low_open = false, high_open = false;
-    bool infinite = false;  ///< inf is in it too
+    bool infinite = false;  ///< inf is allowed, too
 
     [[nodiscard]] bool holds(double x) const;
     [[nodiscard]] std::string words() const;  ///< "a number > 0"
@@ -133,7 +133,7 @@ public:
     void finish();
 
 private:
-    /// What `take` makes of the key's node; where that is nothing, a problem.
+    /// The result of `take` for the key's node; notes a problem if it is empty.
     template <class Take>
     auto value(std::string_view key, const Take& take, const std::string& expected)
         -> decltype(take(std::declval<const toml::node&>()));

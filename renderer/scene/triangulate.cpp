@@ -24,7 +24,7 @@ Vec3 newell_normal(std::span<const Vec3> p) {
     return n;
 }
 
-/// Drops the axis along which the polygon is thinnest, so that the corners turn to the left.
+/// Projects the polygon along the main axis of its normal, so that the corners turn to the left.
 std::vector<Point> flattened(std::span<const Vec3> corners) {
     const Vec3 n = newell_normal(corners);
     int drop = 0;
@@ -78,7 +78,7 @@ std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vec3> corn
         while (!fan && ear < left.size() && !is_ear(flat, left, ear)) ++ear;
         if (ear == left.size()) {
             ear = is_ear(flat, left, 0) ? 0 : 1;
-            fan = ear == 1;  // no ear: it crosses itself, and a search for each triangle would take minutes
+            fan = ear == 1;  // no ear: the polygon crosses itself; a search for each triangle would take minutes
         }
         cut(ear);
     }

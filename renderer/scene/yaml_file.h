@@ -17,8 +17,8 @@ struct YamlFault {
     YAML::Mark at = YAML::Mark::null_mark();
 };
 
-/// `read(document)` of the file, a map. Errors name the file and the line. `expected`: "a calibration in YAML,
-/// ...".
+/// Returns `read(document)` for a file that holds a map. Errors name the file and the line. `expected`: "a
+/// calibration in YAML, ...".
 template <class T, class Read>
 [[nodiscard]] Result<T> read_yaml(const std::string& file, const std::string& expected, const Read& read) {
     std::ifstream in(file, std::ios::binary);

@@ -3,10 +3,10 @@
 
 namespace narpa {
 
-inline constexpr double kCraterReach = 2;  ///< of the rim, in radii: there it has fallen to zero
+inline constexpr double kCraterReach = 2;  ///< outer radius of the rim, in crater radii
 
-/// Height over the ground at r radii (at most kCraterReach) from the middle of a crater of 1 m diameter: a bowl of
-/// depth 0.196 below the crest, and a rim of height 0.036 that falls off (R. Pike, in Impact and Explosion
+/// Height above the ground at r crater radii (at most kCraterReach) from the centre of a crater of 1 m diameter: a
+/// bowl of depth 0.196 below the crest, and a rim of height 0.036 that falls off (R. Pike, in Impact and Explosion
 /// Cratering, 1977).
 inline double crater_profile(double r) {
     constexpr double kRim = 0.036, kDepth = 0.196;

@@ -10,7 +10,7 @@
 namespace narpa {
 namespace {
 
-/// A stream of even numbers for each cell of each step of diameters (S. Vigna's splitmix64).
+/// Uniform random numbers, a stream for each cell of each class of diameters (S. Vigna's splitmix64).
 class CellRandom {
 public:
     CellRandom(std::uint64_t seed, std::uint64_t stream, std::int64_t column, std::int64_t row)
@@ -40,7 +40,8 @@ double rock_profile(double r) {
     return r < 1 ? 0.5 * std::sqrt(1 - r * r) : 0;
 }
 
-/// Rocks above diameter d per square metre, d from `d` to `to`: the area in each step, over that of a rock.
+/// Number of rocks per square metre with diameters from `d` to `to`: the area share of each step over the area of a
+/// rock.
 double rocks_between(double k, double d, double to) {
     const double q = 1.79 + 0.152 / k;
     constexpr int kSteps = 32;
@@ -52,9 +53,8 @@ double rocks_between(double k, double d, double to) {
     return n;
 }
 
-/// Weights of the four posts about a place t between the second and the third: the cubic through these two whose
-/// slopes there are those between their neighbours (E. Catmull, R. Rom, "A class of local interpolating splines",
-/// 1974).
+/// Catmull-Rom weights of four posts at position t between the second and the third (E. Catmull, R. Rom, "A class
+/// of local interpolating splines", 1974).
 std::array<double, 4> spline_weights(double t) {
     return {((2 - t) * t - 1) * t / 2, ((3 * t - 5) * t * t + 2) / 2, ((4 - 3 * t) * t + 1) * t / 2,
             (t - 1) * t * t / 2};
@@ -70,8 +70,8 @@ struct CellRows {
         if (around) return static_cast<std::size_t>((c + columns - 1) % (columns - 1));
         return static_cast<std::size_t>(std::clamp(c, 0, columns - 1));
     }
-    /// In the cell that begins at a column: smooth through the posts. Where one of the sixteen about it has no
-    /// height, on the two triangles of the cell.
+    /// Height at (u, v) in the cell that begins at column c: a bicubic spline; if one of the sixteen posts about
+    /// the cell has no height, linear on its two triangles.
     [[nodiscard]] double height(int c, double u, double v) const {
         if (u == 0 && v == 0) return row[1][column(c)];
         const std::array<std::size_t, 4> at{column(c - 1), column(c), column(c + 1), column(c + 2)};
@@ -90,7 +90,7 @@ struct CellRows {
 
 DetailedSource::DetailedSource(HeightSource& coarse, const PostSpacing& spacing, const TerrainDetail& detail)
     : coarse_(coarse),
-      spacing_{spacing.x_m / detail.posts_per_post, spacing.y_m / detail.posts_per_post},
+      spacing_{spacing.x_m / detail.refinement_factor, spacing.y_m / detail.refinement_factor},
       detail_(detail) {
     constexpr double kStep = 1.189207115002721;  // 2^(1/4): within a step, numbers fall as D^-2
     const double least = 2 * std::max(spacing_.x_m, spacing_.y_m);
@@ -103,14 +103,14 @@ DetailedSource::DetailedSource(HeightSource& coarse, const PostSpacing& spacing,
 }
 
 int DetailedSource::columns() const {
-    return (coarse_.columns() - 1) * detail_.posts_per_post + 1;
+    return (coarse_.columns() - 1) * detail_.refinement_factor + 1;
 }
 int DetailedSource::rows() const {
-    return (coarse_.rows() - 1) * detail_.posts_per_post + 1;
+    return (coarse_.rows() - 1) * detail_.refinement_factor + 1;
 }
 
 bool DetailedSource::read_rows(int row, int count, double* heights) {
-    const int n = detail_.posts_per_post, width = columns(), coarse_rows = coarse_.rows();
+    const int n = detail_.refinement_factor, width = columns(), coarse_rows = coarse_.rows();
     const auto coarse_width = static_cast<std::size_t>(coarse_.columns());
     // Two posts on either side of each cell.
     const int first = std::max(row / n - 1, 0), last = std::min((row + count - 1) / n + 2, coarse_rows - 1);
@@ -123,7 +123,7 @@ bool DetailedSource::read_rows(int row, int count, double* heights) {
         const int r = (row + i) / n;
         const CellRows rows{{row_at(r - 1), row_at(r), row_at(r + 1), row_at(r + 2)},
                             static_cast<int>(coarse_width),
-                            coarse_.goes_around()};
+                            coarse_.is_global()};
         const double v = static_cast<double>((row + i) % n) / n;
         double* const out = heights + static_cast<std::size_t>(i) * static_cast<std::size_t>(width);
         for (int k = 0; k < width; ++k) out[k] = rows.height(k / n, static_cast<double>(k % n) / n, v);
@@ -132,7 +132,8 @@ bool DetailedSource::read_rows(int row, int count, double* heights) {
     return true;
 }
 
-/// Each step of diameters has cells of eight times its diameter, and in each a number of features at random.
+/// Each class of diameters has a grid of cells, eight times as wide as its largest diameter, with a random number
+/// of features in each.
 void DetailedSource::add_features(const Sizes& sizes, std::uint64_t stream, int row, int count,
                                   double* heights) const {
     const double cell_m = 8 * sizes.high_m, reach_m = (sizes.rocks ? 0.5 : 0.5 * kCraterReach) * sizes.high_m;
@@ -147,7 +148,7 @@ void DetailedSource::add_features(const Sizes& sizes, std::uint64_t stream, int 
                 const double x = (static_cast<double>(i) + random.uniform()) * cell_m,
                              y = (static_cast<double>(j) + random.uniform()) * cell_m, u = random.uniform(),
                              freshness = sizes.rocks ? 1 : random.uniform();
-                // Numbers above D as D^-2.
+                // The number above diameter D is proportional to D^-2.
                 const double a = 1 / (sizes.low_m * sizes.low_m), b = 1 / (sizes.high_m * sizes.high_m);
                 const double diameter = 1 / std::sqrt(a + u * (b - a)), radius = 0.5 * diameter;
                 const double reach = sizes.rocks ? radius : kCraterReach * radius;

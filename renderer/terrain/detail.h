@@ -10,13 +10,13 @@ namespace narpa {
 
 /// Craters: the cumulative number above diameter D is `craters` * D^-2 per square metre (D in metres); 0.079 is the
 /// equilibrium of small lunar craters (N. Trask, JPL TR 32-800, 1966). Depth 0.196 D and rim 0.036 D (R. Pike, in
-/// Impact and Explosion Cratering, 1977) when fresh, and down to nothing when old, evenly.
-/// Rocks: the cumulative share of the area below rocks above diameter D is k exp(-q D), q = 1.79 + 0.152 / k, k the
-/// share of all (M. Golombek, D. Rapp, JGR 102, 1997). Half spheroids, half as high as wide.
+/// Impact and Explosion Cratering, 1977) when fresh; scaled by a freshness that is uniform from 0 to 1. Rocks: the
+/// cumulative share of the area below rocks above diameter D is k exp(-q D), q = 1.79 + 0.152 / k, k the share of
+/// all (M. Golombek, D. Rapp, JGR 102, 1997). Half spheroids, half as high as wide.
 struct TerrainDetail {
-    int posts_per_post = 1;  ///< of the finer grid, along each axis; 1: none
-    double craters = 0;      ///< per square metre at 1 m
-    double rocks = 0;        ///< k, share of the area
+    int refinement_factor = 1;  ///< refinement of the grid along each axis; 1: none
+    double craters = 0;         ///< per square metre, above 1 m of diameter
+    double rocks = 0;           ///< k, share of the area
     std::uint64_t seed = 0;
 };
 
@@ -25,16 +25,16 @@ struct PostSpacing {
     double x_m = 0, y_m = 0;
 };
 
-/// A DEM on a grid that is finer by a whole number: smooth between its posts, with the features of TerrainDetail
-/// whose diameters are between two posts of the finer grid and two of the coarser, along the wider spacing.
+/// A DEM interpolated smoothly to a grid that is finer by an integer factor, with those features of TerrainDetail
+/// whose diameters are from two post spacings of the finer grid to two of the coarser one (the wider axis counts).
 class DetailedSource final : public HeightSource {
 public:
-    /// `spacing`: of `coarse`, which must outlive this and, where there are features, not go around a planet.
+    /// `spacing`: that of `coarse`, which must outlive this. With features, `coarse` must not go around a planet.
     DetailedSource(HeightSource& coarse, const PostSpacing& spacing, const TerrainDetail& detail);
 
     [[nodiscard]] int columns() const override;
     [[nodiscard]] int rows() const override;
-    [[nodiscard]] bool goes_around() const override { return coarse_.goes_around(); }
+    [[nodiscard]] bool is_global() const override { return coarse_.is_global(); }
     [[nodiscard]] bool read_rows(int row, int count, double* heights) override;
 
 private:

@@ -18,8 +18,8 @@ public:
 
     [[nodiscard]] virtual int columns() const = 0;
     [[nodiscard]] virtual int rows() const = 0;
-    /// The last column is the first again: the grid goes around the planet.
-    [[nodiscard]] virtual bool goes_around() const { return false; }
+    /// True if the grid goes around the planet: the last column is the first again.
+    [[nodiscard]] virtual bool is_global() const { return false; }
     /// Rows `row` to `row + count - 1`, all columns, row by row. False where they cannot be read.
     [[nodiscard]] virtual bool read_rows(int row, int count, double* heights) = 0;
 };

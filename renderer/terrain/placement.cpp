@@ -22,7 +22,7 @@ bool Placement::place(std::span<Vec3> posts) const {
     std::vector<double> x(posts.size()), y(posts.size());
     std::vector<int> pole(posts.size());
     for (std::size_t i = 0; i < posts.size(); ++i) {
-        double column = posts[i].x / posts_per_post, row = posts[i].y / posts_per_post;
+        double column = posts[i].x / refinement_factor, row = posts[i].y / refinement_factor;
         if (around > 0 && column >= around) column -= around;
         if (first_pole != 0 && row <= 0) pole[i] = first_pole;
         if (last_pole != 0 && row >= last_row) pole[i] = last_pole;

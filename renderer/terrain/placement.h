@@ -1,4 +1,4 @@
-/// renderer/terrain/placement.h - where the posts of a DEM lie in the frame of their body.
+/// renderer/terrain/placement.h - maps the posts of a DEM to positions in their body's frame.
 #pragma once
 
 #include <array>
@@ -23,16 +23,16 @@ struct Placement {
     std::function<bool(std::span<double> x, std::span<double> y)> to_lon_lat;
     double equatorial_m = 0, polar_m = 0;  ///< semi-axes
     Rigid3 T_body_planet{};
-    int around = 0;                     ///< columns of the file, where one more closes the circle; else 0
+    int around = 0;  ///< columns of the file if it goes around the planet (one more closes the circle); else 0
     int first_pole = 0, last_pole = 0;  ///< a row added at the pole: 1 north, -1 south, 0 none
-    int last_row = 0;                   ///< its index, if there is a last_pole
-    int posts_per_post = 1;             ///< the grid is finer than the file's
+    int last_row = 0;                   ///< index of the row of last_pole, if any
+    int refinement_factor = 1;          ///< refinement of the grid over the file's
 
     /// (column, row, height) to positions in the body's frame, in place. False where one has none.
     [[nodiscard]] bool place(std::span<Vec3> posts) const;
-    /// Upwards at a position, unit.
+    /// Unit vector upwards at a position.
     [[nodiscard]] Vec3 up(const Vec3& position) const;
-    /// How far a chord of this length lies below the surface of reference.
+    /// Largest depth of a chord of this length below the reference surface.
     [[nodiscard]] double sag_m(double chord_m) const {
         return on_ellipsoid ? chord_m * chord_m / (8 * (polar_m < equatorial_m ? polar_m : equatorial_m)) : 0;
     }

@@ -8,21 +8,21 @@
 namespace narpa {
 namespace {
 
-constexpr double kMostPosts = 68'719'476'736.0;  // 2^36
-constexpr int kMostAlong = 1 << 20;
+constexpr double kMaxPosts = 68'719'476'736.0;  // 2^36
+constexpr int kMaxAlong = 1 << 20;
 
-/// Of the bound, that a tile may use: the rest is for the strip along a coarser neighbour, which may be off by that
-/// one's error.
+/// Share of the error bound that a tile may use. The rest is for the strip along a coarser neighbour, which may
+/// have that neighbour's error.
 constexpr double kShare = 0.9;
 
 /// What is known of a tile before its triangles are made.
 struct Tile {
     std::array<float, kTileLevels> error_m{};  ///< of each level, [0] is 0; infinite: more than is allowed
-    /// Of the cells along the north, south, west and east edge, at each level above the tile's own.
+    /// Errors of the cells along the north, south, west and east edge, at each level above the tile's own.
     std::array<std::array<float, kTileLevels>, 4> edge_error_m{};
     Vec3 centre{};
     double radius_m = 0;    ///< of a sphere about the centre that holds it
-    double distance_m = 0;  ///< of that sphere from the path of the sensors
+    double distance_m = 0;  ///< from that sphere to the path of the sensors
     int level = -1;         ///< sampled at every 2^level-th post; -1: nothing in it
 };
 
@@ -37,7 +37,7 @@ double distance_to_path(const Vec3& p, const std::vector<Vec3>& path) {
     return nearest;
 }
 
-/// Rows of the source about a row of tiles: that one, and a tile's height above and below it.
+/// The source rows of a row of tiles, and of a tile's height above and below it.
 class RowWindow {
 public:
     explicit RowWindow(HeightSource& source)
@@ -91,7 +91,7 @@ public:
 
     Result<TerrainMesh> build() {
         if (const Status good = survey(); !good) return good.error();
-        if (levels_within(options_.error_px) > most_triangles()) {
+        if (levels_within(options_.error_px) > max_triangles()) {
             all_errors_ = true;
             if (const Status good = survey(); !good) return good.error();
         }
@@ -109,7 +109,7 @@ private:
         return {column, row, std::min(kTileCells, columns_ - 1 - column), std::min(kTileCells, rows_ - 1 - row)};
     }
     [[nodiscard]] const Tile* tile(int i, int j) const {
-        if (source_.goes_around()) i = (i + across_) % across_;
+        if (source_.is_global()) i = (i + across_) % across_;
         if (i < 0 || j < 0 || i >= across_ || j >= down_) return nullptr;
         return &tiles_[static_cast<std::size_t>(j) * static_cast<std::size_t>(across_) +
                        static_cast<std::size_t>(i)];
@@ -179,7 +179,8 @@ private:
         t.radius_m = 1.05 * t.radius_m + half_m;
         t.distance_m = std::max(distance_to_path(t.centre, options_.seen_from) - t.radius_m, spacing_m);
         const HeightWindow heights = rows.window(s.column, s.row, s.width, s.height);
-        // Coarsest first: the first one within the bound is taken, and of the others little is looked at.
+        // Coarsest level first: the first within the bound is taken. For coarser ones the error search ends early,
+        // once it exceeds the bound.
         const double enough_m =
             all_errors_ ? std::numeric_limits<double>::infinity() : allowed_m(t, options_.error_px);
         for (int level = kTileLevels - 1; level > 0; --level) {
@@ -194,8 +195,8 @@ private:
         survey_edges(t, heights, spacing_m);
     }
 
-    /// Of the cells of this stride along each edge. The strip between an edge that a coarser neighbour has thinned
-    /// and the rest of the tile is linear where those cells are, so its error is at most twice theirs.
+    /// Errors of the cells along each edge, for each coarser stride. The strip between an edge that is thinned to a
+    /// coarser neighbour and the rest of the tile is linear over those cells, so its error is at most twice theirs.
     void survey_edges(Tile& t, const HeightWindow& h, double hole_m) {
         const double enough_m =
             all_errors_ ? std::numeric_limits<double>::infinity() : 0.5 * allowed_m(t, options_.error_px);
@@ -216,21 +217,21 @@ private:
         }
     }
 
-    /// Neighbours that are too coarse for the strip along a tile's edge are made finer.
-    void suit_neighbours(double error_px) {
+    /// Refines neighbours that are too coarse for the strip along a tile's edge.
+    void balance_levels(double error_px) {
         for (bool changed = true; changed;) {
             changed = false;
             for (int j = 0; j < down_; ++j)
                 for (int i = 0; i < across_; ++i) {
                     const Tile& t = *tile(i, j);
                     if (t.level < 0) continue;
-                    const double most_m = 0.5 * allowed_m(t, error_px);
+                    const double max_m = 0.5 * allowed_m(t, error_px);
                     const std::array<const Tile*, 4> beside{tile(i, j - 1), tile(i, j + 1), tile(i - 1, j),
                                                             tile(i + 1, j)};
                     for (std::size_t e = 0; e < 4; ++e)
                         while (beside[e] && beside[e]->level > t.level &&
                                static_cast<double>(t.edge_error_m[e][static_cast<std::size_t>(beside[e]->level)]) >
-                                   most_m) {
+                                   max_m) {
                             --tiles_[static_cast<std::size_t>(beside[e] - tiles_.data())].level;
                             changed = true;
                         }
@@ -240,7 +241,7 @@ private:
 
     // --- between the passes
 
-    [[nodiscard]] std::uint64_t most_triangles() const { return options_.budget_bytes / kTerrainBytesPerTriangle; }
+    [[nodiscard]] std::uint64_t max_triangles() const { return options_.budget_bytes / kTerrainBytesPerTriangle; }
     [[nodiscard]] double allowed_m(const Tile& t, double error_px) const {
         return kShare * std::min(error_px * t.distance_m / options_.pixels_per_rad,
                                  options_.error_m * (error_px / options_.error_px));
@@ -256,11 +257,11 @@ private:
         return 2 * static_cast<std::uint64_t>((s.width + stride - 1) / stride) *
                static_cast<std::uint64_t>((s.height + stride - 1) / stride);
     }
-    /// Chooses the levels of all tiles; how many triangles they have.
+    /// Chooses the levels of all tiles; returns the number of triangles.
     std::uint64_t levels_within(double error_px) {
         for (Tile& t : tiles_)
             if (t.level >= 0) t.level = level_within(t, error_px);
-        suit_neighbours(error_px);
+        balance_levels(error_px);
         std::uint64_t n = 0;
         for (int j = 0; j < down_; ++j)
             for (int i = 0; i < across_; ++i)
@@ -268,9 +269,9 @@ private:
         return n;
     }
 
-    /// The least bound, in steps of a fifth from what is asked for, that the budget has room for.
+    /// Finds the least error bound that fits the budget, in steps of a fifth from the requested one.
     Status choose_levels() {
-        const std::uint64_t most = most_triangles();
+        const std::uint64_t most = max_triangles();
         double error_px = options_.error_px;
         std::uint64_t n = levels_within(error_px);
         for (int step = 0; n > most; ++step, n = levels_within(error_px)) {
@@ -294,8 +295,8 @@ private:
     // --- second pass: the triangles
 
     Status triangulate() {
-        // On a plane the origin is the body's, at the mean height; else amid the tiles, and for a whole planet its
-        // centre.
+        // The origin is, on a plane, the body's origin at mid height; on an ellipsoid, the middle of the tile
+        // centres, which for a whole planet is its centre.
         Vec3 low{1e300, 1e300, 1e300}, high = -low;
         for (const Tile& t : tiles_)
             if (t.level >= 0)
@@ -303,7 +304,7 @@ private:
                     low[k] = std::min(low[k], t.centre[k]), high[k] = std::max(high[k], t.centre[k]);
         for (int k = 0; k < 3; ++k) out_.origin_m[k] = std::round(0.5 * (low[k] + high[k]));
         if (!placement_.on_ellipsoid) out_.origin_m.x = out_.origin_m.y = 0;
-        if (source_.goes_around()) out_.origin_m = {};
+        if (source_.is_global()) out_.origin_m = {};
         RowWindow rows(source_);
         for (int j = 0; j < down_; ++j) {
             const int first = j * kTileCells;
@@ -316,7 +317,7 @@ private:
         return Ok{};
     }
 
-    /// The stride of an edge: the coarser of the two tiles.
+    /// The stride of an edge: that of the coarser of its two tiles.
     [[nodiscard]] int edge_stride(int own, int i, int j) const {
         const Tile* beside = tile(i, j);
         return beside ? std::max(own, 1 << std::max(beside->level, 0)) : own;
@@ -340,7 +341,7 @@ private:
         [[nodiscard]] int row(int l) const {
             return l > down ? span.row + span.height + stride : span.row + std::min(l * stride, span.height);
         }
-        /// On an edge, the vertex before it that the coarser tile has too.
+        /// On an edge: the nearest vertex at or before k that the coarser tile has, too.
         [[nodiscard]] static int snapped(int k, int last, int coarser) {
             return k == last ? k : k / coarser * coarser;
         }
@@ -355,7 +356,7 @@ private:
     };
 
     [[nodiscard]] int inside_columns(int column) const {
-        if (source_.goes_around()) return (column + columns_ - 1) % (columns_ - 1);
+        if (source_.is_global()) return (column + columns_ - 1) % (columns_ - 1);
         return std::clamp(column, 0, columns_ - 1);
     }
     [[nodiscard]] double height_at(const RowWindow& rows, int column, int row) const {
@@ -364,7 +365,7 @@ private:
     [[nodiscard]] Vec3 post(const RowWindow& rows, int column, int row) const {
         const double h = height_at(rows, column, row);
         return {static_cast<double>(
-                    source_.goes_around() && column >= 0 && column < columns_ ? column : inside_columns(column)),
+                    source_.is_global() && column >= 0 && column < columns_ ? column : inside_columns(column)),
                 static_cast<double>(std::clamp(row, 0, rows_ - 1)), h == h ? h : 0};
     }
 
@@ -395,7 +396,7 @@ private:
         return add_coarse_normals(rows);
     }
 
-    /// Columns and rows turn the other way round than on most maps.
+    /// Whether columns and rows are left-handed, unlike on most maps.
     [[nodiscard]] bool is_left_handed(const Lattice& a) const {
         const int k = a.across / 2, l = a.down / 2;  // a pole row is never amid a tile of more than one cell
         const Vec3 p = a.position[a.index(k, l + 1)], east = a.position[a.index(k + 1, l + 1)] - p,
@@ -440,7 +441,7 @@ private:
         return id;
     }
 
-    /// Of the tiles that share a vertex, the coarsest stride: all of them give it the same normal.
+    /// The coarsest stride of the tiles that share a vertex: all of them give it the same normal.
     [[nodiscard]] int stride_at(const Lattice& a, int i, int j, int k, int l) const {
         const int di = k == 0 ? -1 : k == a.across ? 1 : 0, dj = l == 0 ? -1 : l == a.down ? 1 : 0;
         int stride = a.stride;
@@ -508,7 +509,7 @@ Result<TerrainMesh> build_terrain(HeightSource& source, const Placement& placeme
     if (columns < 2 || rows < 2)
         return Error{"it has " + std::to_string(columns) + " x " + std::to_string(rows) +
                      " posts, expected at least 2 x 2"};
-    if (columns > kMostAlong || rows > kMostAlong || static_cast<double>(columns) * rows > kMostPosts)
+    if (columns > kMaxAlong || rows > kMaxAlong || static_cast<double>(columns) * rows > kMaxPosts)
         return Error{"it has " + std::to_string(columns) + " x " + std::to_string(rows) +
                      " posts, expected at most 2^20 along a side and 2^36 in all"};
     return Builder(source, placement, options, progress).build();

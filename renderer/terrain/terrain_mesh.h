@@ -1,10 +1,10 @@
-/// renderer/terrain/terrain_mesh.h - from a DEM to triangles, as many as an error in pixels asks for.
+/// renderer/terrain/terrain_mesh.h - triangulates a DEM at levels of detail chosen by an error bound in pixels.
 ///
 /// The grid is cut into tiles of 64 x 64 cells. Each is sampled at every post, or at every 2nd, 4th ... 64th, the
 /// coarsest whose error, seen from the nearest point of the path of the sensors, is within the bound. A cell is two
-/// triangles, parted from its first row and column to its last. Where two tiles meet, the finer one uses the
-/// coarser one's vertices alone: both have the same edge, so that there is nothing to see between them. All of it
-/// is decided before the first frame, so that nothing changes while one is made, or from one to the next.
+/// triangles, split along the diagonal from its first row and column to its last. Along a common edge the finer of
+/// two tiles uses the coarser one's vertices alone, so that there are no cracks. Levels are chosen before the first
+/// frame and never change, so that no detail pops between frames.
 #pragma once
 
 #include <array>
@@ -26,10 +26,10 @@ struct TerrainOptions {
     double error_m = std::numeric_limits<double>::infinity();  ///< a bound in metres beside it
     std::vector<Vec3>
         seen_from;  ///< the path of the sensors, body frame: points, straight between them; never empty
-    std::uint64_t budget_bytes = std::uint64_t{1} << 30;  ///< that the surface may take in memory
+    std::uint64_t budget_bytes = std::uint64_t{1} << 30;  ///< memory that the surface may take
 };
 
-/// Memory that a triangle takes when the scene is loaded: its share of vertices, and of Embree's hierarchy.
+/// Memory per triangle when the scene is loaded, with its share of the vertices and of Embree's hierarchy.
 inline constexpr std::uint64_t kTerrainBytesPerTriangle = 160;
 
 struct TerrainMesh {
@@ -48,7 +48,7 @@ struct TerrainMesh {
     } summary;
 };
 
-/// `progress` is told the share that is done, 0 to 1. Errors say what is wrong with the DEM, without its name.
+/// `progress` is called with the completed share, 0 to 1. Errors say what is wrong with the DEM, without its name.
 [[nodiscard]] Result<TerrainMesh> build_terrain(HeightSource& source, const Placement& placement,
                                                 const TerrainOptions& options,
                                                 const std::function<void(double)>& progress = {});

@@ -7,11 +7,11 @@
 namespace narpa {
 namespace {
 
-constexpr std::size_t kMost = kTileCells + 1;
+constexpr std::size_t kMax = kTileCells + 1;
 
-/// The two triangles of each cell of a row of cells, as lines in v at each column: a + v b.
+/// The two triangles of each cell of a row of cells: at each column their heights are linear in v, a + v b.
 struct CellRow {
-    std::array<double, kMost> u{}, upper_a{}, upper_b{}, lower_a{}, lower_b{};
+    std::array<double, kMax> u{}, upper_a{}, upper_b{}, lower_a{}, lower_b{};
 
     CellRow(const HeightWindow& h, int stride, int top, int bottom) {
         for (int left = 0; left < h.width; left += stride) {

@@ -1,4 +1,5 @@
-/// renderer/terrain/tile_errors.h - how far a tile that leaves out posts is from the surface through all of them.
+/// renderer/terrain/tile_errors.h - the error of a tile with a subset of the posts against the surface through all
+/// of them.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +23,7 @@ struct HeightWindow {
 
 /// The largest vertical distance, at posts, of the triangles of every `stride`-th post from the posts, metres.
 /// Where one of the two surfaces has a hole and the other none, `hole_m` times the stride at least: the width of
-/// what is lost or filled. Above `enough_m` any larger value will do.
+/// what is lost or filled. An error above `enough_m` need not be exact.
 [[nodiscard]] double tile_error(const HeightWindow& heights, int stride, double hole_m,
                                 double enough_m = std::numeric_limits<double>::infinity());
 

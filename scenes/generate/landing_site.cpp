@@ -14,10 +14,10 @@ namespace {
 /// triangles from every height.
 struct Rings {
     int sectors;
-    double least_m;  ///< between rings, and the finest detail
+    double min_m;  ///< between rings, and the finest detail
 
     [[nodiscard]] double part() const { return 2 * kPi / sectors; }
-    [[nodiscard]] double spacing_m(double r) const { return std::max(least_m, part() * r); }
+    [[nodiscard]] double spacing_m(double r) const { return std::max(min_m, part() * r); }
     /// Distances from the site.
     [[nodiscard]] std::vector<double> radii() const {
         std::vector<double> all{0};

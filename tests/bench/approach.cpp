@@ -63,7 +63,7 @@ TEST(BenchApproach, FindsTheDockingStationAtAllRanges) {
     EXPECT_TRUE(plot_approach_frames(frames, **world, 0, 0, options, threads));
     EXPECT_GT(std::filesystem::file_size(frames), 20000u);
     EXPECT_EQ(to_json(*runs)[0]["bands"].back()["found"], all.found);
-    EXPECT_NE(in_words(*runs).find("features"), std::string::npos);
+    EXPECT_NE(to_text(*runs).find("features"), std::string::npos);
 }
 
 TEST(BenchApproach, FindsTheIssBeforeTheEarthAtTheEdgeOfEclipse) {

@@ -90,7 +90,7 @@ TEST(BenchIcp, FindsTheDockingStation) {
     }
     EXPECT_EQ(reported, 23);
     EXPECT_EQ(to_json(runs)[0].at("found"), 15);
-    EXPECT_NE(in_words(runs).find("100.0%"), std::string::npos);
+    EXPECT_NE(to_text(runs).find("100.0%"), std::string::npos);
 }
 
 }  // namespace

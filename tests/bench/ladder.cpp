@@ -113,9 +113,9 @@ TEST(BenchLadder, AnErrorBelowTheReferencesNoiseIsAFault) {
 
 TEST(BenchLadder, TheMedianOverBudgetsInRaysMustReachItsSpeedUp) {
     SceneLadder scene = beside_the_loop({rung("1 spp", 4, 0.5), adaptive(2, 0.5)});
-    scene.speed_up_least = 1.9;
+    scene.speed_up_min = 1.9;
     EXPECT_TRUE(bench_faults(scene).empty());
-    scene.speed_up_least = 2.1;
+    scene.speed_up_min = 2.1;
     EXPECT_NE(only_fault(scene).find("2.00 times as fast as the plain loop"), std::string::npos);
     scene.ladder.rungs[1].rmse.value = 0.1, scene.ladder.rungs[1].predicted = 0.1;
     EXPECT_NE(only_fault(scene).find("no budget's error lies between"), std::string::npos);
@@ -124,7 +124,7 @@ TEST(BenchLadder, TheMedianOverBudgetsInRaysMustReachItsSpeedUp) {
 TEST(BenchLadder, SmallBudgetsCountOnlyWhereTheyAreJudged) {
     SceneLadder scene = beside_the_loop({adaptive(2, 0.5)});
     scene.width = scene.height = 100;
-    scene.speed_up_least = 2.1, scene.speed_up_from = 16;
+    scene.speed_up_min = 2.1, scene.speed_up_from = 16;
     scene.ladder.rungs[0].rays = 15 * 100 * 100;
     EXPECT_NE(only_fault(scene).find("from 16 rays a pixel on"), std::string::npos);
     scene.ladder.rungs[0].rays = 8 * 100 * 100;

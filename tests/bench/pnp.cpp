@@ -19,7 +19,7 @@ TEST(PnpBench, TrialsFollowTheSetting) {
         std::size_t inliers = 0;
         for (int k = 0; k < 50; ++k) {
             const auto trial = draw_trial({scene, 20, 0.5, 30, 0.2}, random);
-            ASSERT_TRUE(trial) << in_words(scene);
+            ASSERT_TRUE(trial) << to_text(scene);
             ASSERT_EQ(trial->body_m.size(), 20u);
             ASSERT_EQ(trial->inliers, 16u);
             EXPECT_GT(trial->bound_rotation_rad, 0);
@@ -32,7 +32,7 @@ TEST(PnpBench, TrialsFollowTheSetting) {
         }
         // The variance of the noise, within four standard deviations.
         const double n = static_cast<double>(inliers);
-        EXPECT_NEAR(squares / n, 0.25, 4 * 0.25 * std::sqrt(2 / n)) << in_words(scene);
+        EXPECT_NEAR(squares / n, 0.25, 4 * 0.25 * std::sqrt(2 / n)) << to_text(scene);
     }
 }
 
@@ -65,7 +65,7 @@ TEST(PnpBench, EveryMethodSolvesTheSameTrials) {
     const nlohmann::json document = to_json(cells);
     EXPECT_EQ(document[0]["points"], 12);
     EXPECT_EQ(document[0]["rows"].size(), cells[0].rows.size());
-    EXPECT_NE(in_words(cells).find("12 points, 0.5 px, 20 m"), std::string::npos);
+    EXPECT_NE(to_text(cells).find("12 points, 0.5 px, 20 m"), std::string::npos);
 }
 
 TEST(PnpBench, VerdictComparesErrorsFailuresAndTimes) {

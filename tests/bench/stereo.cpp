@@ -27,7 +27,7 @@ TEST(StereoBench, SubpixelErrorsAreFiveTimesSmallerAndAsPredicted) {
     ASSERT_TRUE(scene) << scene.error().text();
     const auto bench = measure_stereo(*scene, 100, quietly);
     ASSERT_TRUE(bench) << bench.error().text();
-    EXPECT_EQ(all(stereo_faults(*bench, 100)), "") << in_words(*bench);
+    EXPECT_EQ(all(stereo_faults(*bench, 100)), "") << to_text(*bench);
 
     // The paper's geometry: f of 500 x 500 pixels and 30 degrees from corner to corner, t = -(30, 0, 50) m.
     EXPECT_NEAR(bench->pair.left.fx, 1319.479, 1e-3);
@@ -151,7 +151,7 @@ TEST(StereoBench, ErrorsOnRealGroundAreAsPredicted) {
     ASSERT_TRUE(descent);
     const auto bench = measure_stereo(gale(test::read_image_file(file), *descent), 100, quietly);
     ASSERT_TRUE(bench) << bench.error().text();
-    EXPECT_EQ(all(stereo_faults(*bench, 100)), "") << in_words(*bench);
+    EXPECT_EQ(all(stereo_faults(*bench, 100)), "") << to_text(*bench);
 }
 
 }  // namespace

@@ -51,8 +51,8 @@ std::uint32_t stream(CanBus& from, CanBus& to, std::uint32_t n, std::uint32_t wi
     std::uint32_t sent = 0, got = 0;
     ReceivedFrame out;
     const auto number = [](const CanFrame& f) { return f.data[0] | f.data[1] << 8 | f.data[2] << 16; };
-    constexpr std::int64_t kPatience_ns = 120 * kSecond_ns;  // without progress; an emulated machine is slow
-    for (std::int64_t until_ns = monotonic_ns() + kPatience_ns; got < n && monotonic_ns() < until_ns;
+    constexpr std::int64_t kTimeout_ns = 120 * kSecond_ns;  // without progress; an emulated machine is slow
+    for (std::int64_t until_ns = monotonic_ns() + kTimeout_ns; got < n && monotonic_ns() < until_ns;
          to.wait(10'000'000)) {
         for (; sent < n && sent - got < window; ++sent) {
             const auto byte = [&](int i) { return static_cast<std::uint8_t>(sent >> (8 * i)); };
@@ -62,7 +62,7 @@ std::uint32_t stream(CanBus& from, CanBus& to, std::uint32_t n, std::uint32_t wi
             for (int i = 0; i < 3; ++i) f.data[static_cast<std::size_t>(i)] = byte(i);
             if (!from.send(f)) break;
         }
-        for (; to.receive(out); ++got, until_ns = monotonic_ns() + kPatience_ns) {
+        for (; to.receive(out); ++got, until_ns = monotonic_ns() + kTimeout_ns) {
             if (number(out.frame) == static_cast<int>(got) && out.frame.fd == (fd && got % 2 == 1)) continue;
             ADD_FAILURE() << "frame " << number(out.frame) << " came where " << got << " was expected";
             return got;

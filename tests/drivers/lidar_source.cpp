@@ -18,7 +18,7 @@ namespace {
 
 using test::Bytes;
 
-constexpr std::int64_t kPatience_ns = 30'000'000'000;  // for what must come
+constexpr std::int64_t kTimeout_ns = 30'000'000'000;  // for what must come
 
 Bytes counted_bytes(std::size_t size, std::size_t first) {
     Bytes bytes(size);
@@ -55,7 +55,7 @@ TEST(UdpSource, PacketsComeInOrder) {
         for (std::size_t i = 0; i < 300; ++i) ASSERT_TRUE(sink->send(PacketKind::data, counted_bytes(1206, i), 0));
         for (std::size_t i = 0; i < 300; ++i) {
             bytes.assign(1500, 0);
-            ASSERT_EQ(at.source->receive(bytes, kPatience_ns), 1206U);
+            ASSERT_EQ(at.source->receive(bytes, kTimeout_ns), 1206U);
             bytes.resize(1206);
             ASSERT_EQ(bytes, counted_bytes(1206, i)) << i;
         }
@@ -73,7 +73,7 @@ TEST(UdpSource, WaitsForWhatComesLater) {
         sink->send(PacketKind::data, counted_bytes(1206, 1), 0);
     });
     Bytes bytes(1206);
-    EXPECT_EQ(at.source->receive(bytes, kPatience_ns), 1206U);
+    EXPECT_EQ(at.source->receive(bytes, kTimeout_ns), 1206U);
     sender.join();
 }
 
@@ -84,7 +84,7 @@ TEST(UdpSource, WhatIsEmptyOrTooLongIsRefusedAndCounted) {
     sink->send(PacketKind::data, counted_bytes(1207, 0), 0);
     sink->send(PacketKind::data, counted_bytes(512, 5), 0);
     Bytes bytes(1206);
-    ASSERT_EQ(at.source->receive(bytes, kPatience_ns), 512U);
+    ASSERT_EQ(at.source->receive(bytes, kTimeout_ns), 512U);
     bytes.resize(512);
     EXPECT_EQ(bytes, counted_bytes(512, 5));
     EXPECT_EQ(at.source->counters().refused, 2U);
@@ -100,7 +100,7 @@ TEST(UdpSource, WhatTheKernelLosesIsCounted) {
     // A packet tells what was lost before it: the first to find room again tells of the flood.
     while (at.source->receive(bytes, 0) > 0) continue;
     ASSERT_TRUE(sink->send(PacketKind::data, packet, 0));
-    ASSERT_EQ(at.source->receive(bytes, kPatience_ns), 1206U);
+    ASSERT_EQ(at.source->receive(bytes, kTimeout_ns), 1206U);
     EXPECT_GT(at.source->counters().lost, 0U);
     EXPECT_EQ(at.source->counters().received + at.source->counters().lost, count + 1);
 }

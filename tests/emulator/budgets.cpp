@@ -191,8 +191,8 @@ TEST_F(Budgets, TheReportCountsFramesByStep) {
         const nlohmann::json& camera = told["cameras"][0];
         for (const std::string_view name : kStepNames)
             EXPECT_EQ(camera["steps"][std::string(name)], name == step ? 4 : 0) << name;
-        EXPECT_NE(in_words(*emulator).find(std::string("steps: 4 ") + step), std::string::npos)
-            << in_words(*emulator);
+        EXPECT_NE(to_text(*emulator).find(std::string("steps: 4 ") + step), std::string::npos)
+            << to_text(*emulator);
         for (const Row& row : read_rows(folder_ / "log/nav.ledger.csv"))
             EXPECT_EQ(kStepNames[whole(row, "step")], step);
     }

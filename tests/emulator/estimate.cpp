@@ -400,8 +400,8 @@ TEST(EstimateSummary, CoversTheFramesWithAPose) {
     EXPECT_NEAR(s.rotation_rms_rad, 0.01, 1e-12);
     EXPECT_NEAR(s.position_rms_of_range, 0.02, 1e-12);
     EXPECT_NEAR(s.nees_mean, 2, 1e-9);
-    EXPECT_NE(in_words(s).find("NEES 2.00, 6 expected, 95 % band 1.20 to 10.80; inside: "), std::string::npos)
-        << in_words(s);
+    EXPECT_NE(to_text(s).find("NEES 2.00, 6 expected, 95 % band 1.20 to 10.80; inside: "), std::string::npos)
+        << to_text(s);
     EXPECT_NEAR(s.position_of_bound, 1 / std::sqrt(3.0), 1e-9);
     EXPECT_EQ(estimate_row(frames[2]).substr(0, 9), "0,0,lost,");
     frames[2].why = "bad, and worse";

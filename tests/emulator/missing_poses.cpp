@@ -39,7 +39,7 @@ TEST_F(MissingPoses, FailALockstepRun) {
               std::vector<std::string>{"no pose command was accepted for \"target\" (can_id 0x120); a lockstep run "
                                        "begins when every body with a can_id has a pose"});
     EXPECT_EQ(report(*emulator)["passed"], false);
-    EXPECT_NE(in_words(*emulator).find("  failed: no pose command was accepted for \"target\""), std::string::npos);
+    EXPECT_NE(to_text(*emulator).find("  failed: no pose command was accepted for \"target\""), std::string::npos);
 }
 
 TEST_F(MissingPoses, OfAnotherIdentifierAreCounted) {
@@ -111,7 +111,7 @@ TEST_F(MissingPoses, FramesThatNobodyGotAreAmongTheFaults) {
     StopFlag stop{true};
     ASSERT_TRUE((*emulator)->run(stop));
     EXPECT_TRUE(failures(**emulator).empty()) << "it was stopped while it waited";
-    const std::string said = in_words(**emulator);
+    const std::string said = to_text(**emulator);
     const std::string expected = "0 frames received (0 foreign), 0 sent, 2 not (no client, full queue or interface";
     EXPECT_NE(said.find(expected), std::string::npos) << said;
 }

@@ -416,7 +416,7 @@ TEST(BudgetCost, IsTheMeanOverFramesOfWhatEachCost) {
     EXPECT_DOUBLE_EQ(c.rmse_largest, 0.1);
     EXPECT_NEAR(c.bias, -0.0375, 1e-12);
     EXPECT_NEAR(c.ssim_mean, 0.925, 1e-12);
-    EXPECT_DOUBLE_EQ(c.ssim_least, 0.9);
+    EXPECT_DOUBLE_EQ(c.ssim_min, 0.9);
     EXPECT_NEAR(c.edges.mean_px, 0.2, 1e-12);
     EXPECT_NEAR(c.edges.rms_px, std::sqrt((0.2 * 0.2 + 0.6 * 0.6) / 2), 1e-12);
     EXPECT_NEAR(c.edges.p99_px, 0.9, 1e-12);

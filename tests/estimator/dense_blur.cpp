@@ -85,7 +85,7 @@ TEST(InformativePixels, AreTheFewestThatHoldThatPart) {
     };
     for (const double part : {0.5, 0.85}) {
         const auto chosen = informative_pixels(images, {}, part);
-        double all = 0, of_chosen = 0, least = kAll, most_left = 0;
+        double all = 0, of_chosen = 0, least = kAll, max_left = 0;
         std::size_t n = 0;
         for (std::size_t p = 0; p < chosen.size(); ++p) {
             if (!inside(p)) continue;
@@ -93,11 +93,11 @@ TEST(InformativePixels, AreTheFewestThatHoldThatPart) {
             if (chosen[p] != 0)
                 of_chosen += held(p), least = std::min(least, held(p)), ++n;
             else
-                most_left = std::max(most_left, held(p));
+                max_left = std::max(max_left, held(p));
         }
         EXPECT_GE(of_chosen, 0.999 * part * all);
         EXPECT_LT(of_chosen - least, part * all);
-        EXPECT_LT(most_left, 1.001 * least);
+        EXPECT_LT(max_left, 1.001 * least);
         EXPECT_LT(n, chosen.size() / 4);
     }
 }

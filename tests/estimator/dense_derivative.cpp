@@ -199,11 +199,11 @@ TEST(ImageDerivative, OfAFaceSeenNearlyEdgeOn) {
         unit << 1, 1, 1, 10, 10, 10;
         const Matrix6 scaled = unit.asDiagonal() * information * unit.asDiagonal();
         const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(scaled);
-        const Vector6 held_least = unit.asDiagonal() * eigen.eigenvectors().col(0);
-        EXPECT_NEAR(rms_change(J_at(pose, 4), held_least) / rms_change(fine, held_least), 1, 0.15) << turn;
+        const Vector6 held_min = unit.asDiagonal() * eigen.eigenvectors().col(0);
+        EXPECT_NEAR(rms_change(J_at(pose, 4), held_min) / rms_change(fine, held_min), 1, 0.15) << turn;
         Renders r;
         r.fineness = 4;
-        EXPECT_LT(relative_error(*render_scene, camera, 0, pose, 0.005 * held_least, r), 0.3) << turn;
+        EXPECT_LT(relative_error(*render_scene, camera, 0, pose, 0.005 * held_min, r), 0.3) << turn;
     }
 }
 

@@ -192,13 +192,13 @@ TEST(EmptyBeams, BadOnesAreReported) {
 TEST(EmptyBeams, ReturnsAreCertainWhereTheLidarSaysSo) {
     Lidar lidar;
     lidar.range_max_m = 100;
-    const double unstated = certain_return_of(lidar, {}).least_light_1_m2;
+    const double unstated = certain_return_of(lidar, {}).min_light_1_m2;
     EXPECT_NEAR(unstated, 3 * 0.1 / (50.0 * 50), 1e-12);
     lidar.receiver.range_at_10_percent_m = 100;
-    EXPECT_NEAR(certain_return_of(lidar, {}).least_light_1_m2, unstated / 4, 1e-12);
+    EXPECT_NEAR(certain_return_of(lidar, {}).min_light_1_m2, unstated / 4, 1e-12);
     lidar.receiver.detection_snr = 4, lidar.receiver.sunlight_noise = 3, lidar.receiver.range_min_m = 0.5;
     const CertainReturn noisy = certain_return_of(lidar, {});
-    EXPECT_NEAR(noisy.least_light_1_m2, unstated, 1e-12) << "twice the limit and twice the noise";
+    EXPECT_NEAR(noisy.min_light_1_m2, unstated, 1e-12) << "twice the limit and twice the noise";
     EXPECT_EQ(noisy.nearest_m, 0.5);
     EXPECT_EQ(noisy.farthest_m, 100);
     Scene dusty;

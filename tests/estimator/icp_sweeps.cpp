@@ -167,7 +167,7 @@ TEST(IcpSweeps, OutliersDoNotMoveIt) {
     std::mt19937_64 random(12);
     std::uniform_real_distribution<double> u(0, 1);
     IcpSettings settings = noisy();
-    settings.explained_least = 0.65;
+    settings.min_inlier_share = 0.65;
     CloudIcp icp(bench().tracer, 0, settings);
     constexpr int kStarts = 30;
     Statistics all;
@@ -372,7 +372,7 @@ TEST(IcpSweeps, TheDerivativeIsThatOfTheDistance) {
     std::size_t looked_at = 0, agree = 0;
     for (std::size_t i = 0; i < at.size(); ++i) {
         const bool grazes = at[i].sigma_m < 0.3 * kNoise.range_m;
-        if (at[i].fate != BeamFate::met || grazes || std::abs(at[i].distance_m) > 0.1) continue;
+        if (at[i].fate != BeamClass::met || grazes || std::abs(at[i].distance_m) > 0.1) continue;
         // The plane's own turn moves the point by its distance from where the beam meets the plane: the noise.
         ++looked_at;
         if ((numeric[i] - beams.derivative(T, i, at[i])).norm() > std::abs(at[i].distance_m) * 4 + 1e-6) continue;

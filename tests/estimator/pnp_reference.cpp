@@ -35,11 +35,11 @@ TEST_F(PnpReference, EndsWhereCeresEnds) {
                 options.lm.iterations_max = 200;
                 const Rigid3 start = test::pose_off_by(random_, truth, 0.0005, 0.0001);
                 const PnpFit& ours = refiner_.refine(input, start, options);
-                ASSERT_TRUE(ours.ok()) << in_words(ours.status);
+                ASSERT_TRUE(ours.ok()) << to_text(ours.status);
                 // Ceres stops where the cost changes by less than 1e-6 of itself, which may be early.
                 EXPECT_LE(ours.chi2, refine_with_ceres(input, start, options.loss).chi2 * (1 + 1e-9));
                 const PnpFit theirs = refine_with_ceres(input, ours.T_camera_body, options.loss);
-                ASSERT_TRUE(theirs.ok()) << in_words(theirs.status);
+                ASSERT_TRUE(theirs.ok()) << to_text(theirs.status);
                 EXPECT_NEAR(ours.chi2, theirs.chi2, 1e-6 * theirs.chi2);
                 EXPECT_LT(normalised_error_squared(error_between(ours.T_camera_body, theirs.T_camera_body),
                                                    ours.covariance),

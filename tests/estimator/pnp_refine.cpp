@@ -29,7 +29,7 @@ TEST_F(Refine, EveryAttitudeIsReachedWithinTenSteps) {
             const test::Seen seen = test::see(random_, test::random_points(random_, 12, 2.5), truth, 0.1);
             const PnpFit& fit =
                 refiner_.refine(seen.input(), test::pose_off_by(random_, truth, 3 * kRadPerDeg, 0.02));
-            ASSERT_TRUE(fit.ok()) << in_words(fit.status);
+            ASSERT_TRUE(fit.ok()) << to_text(fit.status);
             steps_max = std::max(steps_max, fit.summary.iterations);
             // Chi-square of six degrees of freedom exceeds 45 once in 2e7 draws.
             EXPECT_LT(normalised_error_squared(error_between(fit.T_camera_body, truth), fit.covariance), 45);
@@ -126,7 +126,7 @@ TEST_F(Refine, RobustLossRejectsOutliers) {
         const PnpFit robust =
             refiner_.refine(seen.input(), test::pose_off_by(random_, truth, 0.002, 0.0005), options);
         const PnpFit plain = refiner_.refine(seen.input(), truth);
-        ASSERT_TRUE(robust.ok()) << in_words(robust.status);
+        ASSERT_TRUE(robust.ok()) << to_text(robust.status);
         const double error = norm(rotation_vector(robust.T_camera_body.q * conjugate(truth.q)));
         const double sigma = std::sqrt(robust.covariance.topLeftCorner<3, 3>().trace());
         EXPECT_LT(error, 5 * sigma);

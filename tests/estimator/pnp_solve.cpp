@@ -53,7 +53,7 @@ TEST_F(SolvePnp, AttainsTheBound) {
             const test::Seen seen = test::see(random_, test::random_points(random_, n, std::min(2., 0.2 * range_m)),
                                               some_pose(range_m), sigma_px);
             const PnpSolution& s = solver_.solve(seen.input());
-            ASSERT_TRUE(s.ok()) << in_words(s.status);
+            ASSERT_TRUE(s.ok()) << to_text(s.status);
             const Bounds b = bounds(seen);
             const Vector6 e = error_between(s.fit.T_camera_body, seen.T_camera_body);
             rotation += e.head<3>().squaredNorm() / (b.rotation_rad * b.rotation_rad) / kTrials;
@@ -74,7 +74,7 @@ TEST_F(SolvePnp, ExactPixelsGiveTheExactPose) {
             PnpInput input = seen.input();
             input.sigma_px = 1e-3;
             const PnpSolution& s = solver_.solve(input);
-            ASSERT_TRUE(s.ok()) << in_words(s.status);
+            ASSERT_TRUE(s.ok()) << to_text(s.status);
             wrong += error_between(s.fit.T_camera_body, seen.T_camera_body).norm() < 1e-6 ? 0 : 1;
         }
         EXPECT_EQ(wrong, 0) << n;
@@ -89,7 +89,7 @@ TEST_F(SolvePnp, SettlesWhereRoundingIsTheNoise) {
                 const test::Seen seen =
                     test::see(random_, test::random_points(random_, n, 1), some_pose(8), sigma_px);
                 const PnpSolution& s = solver_.solve(seen.input());
-                ASSERT_TRUE(s.ok()) << in_words(s.status) << ": " << n << " points, " << sigma_px << " px";
+                ASSERT_TRUE(s.ok()) << to_text(s.status) << ": " << n << " points, " << sigma_px << " px";
                 const Vector6 e = error_between(s.fit.T_camera_body, seen.T_camera_body);
                 // Four points have several poses that fit.
                 if (n == 4) continue;
@@ -115,7 +115,7 @@ TEST_F(SolvePnp, BothMinimaOfAPlaneAreReported) {
             for (int trial = 0; trial < 4000; ++trial) {
                 const test::Seen seen = test::see(random_, square(8, 1), tilted(tilt_deg, range_m), 0.3);
                 const PnpSolution& s = solver_.solve(seen.input());
-                ASSERT_TRUE(s.ok() || s.status == PnpStatus::no_convergence) << in_words(s.status);
+                ASSERT_TRUE(s.ok() || s.status == PnpStatus::no_convergence) << to_text(s.status);
                 unsettled += s.ok() ? 0 : 1;
                 const auto is_true = [&](const PnpFit& f) {
                     return normalised_error_squared(error_between(f.T_camera_body, seen.T_camera_body),
@@ -171,7 +171,7 @@ TEST_F(SolvePnp, OutliersAreFoundAndLeftOut) {
             const auto outliers = static_cast<std::size_t>(part * n);
             for (std::size_t i = 0; i < outliers; ++i) seen.pixels[i] = {anywhere(random_), anywhere(random_)};
             const PnpSolution& s = solver_.solve(seen.input(), true);
-            ASSERT_TRUE(s.ok()) << in_words(s.status);
+            ASSERT_TRUE(s.ok()) << to_text(s.status);
             const double e2 =
                 normalised_error_squared(error_between(s.fit.T_camera_body, seen.T_camera_body), s.fit.covariance);
             wrong += e2 < 45 ? 0 : 1;

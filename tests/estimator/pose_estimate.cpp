@@ -78,7 +78,8 @@ TEST(PoseError, NormalisedSquaresAreChiSquare) {
         sum += normalised_error_squared(L * e, C);
     }
     EXPECT_NEAR(sum / kDraws, 6, 4 * std::sqrt(12.0 / kDraws));  // mean 6, variance 12
-    EXPECT_EQ(normalised_error_squared(Vector6::Ones(), Matrix6::Zero()), std::numeric_limits<double>::infinity());
+    EXPECT_EQ(normalised_error_squared(Vector6(Vector6::Ones()), Matrix6(Matrix6::Zero())),
+              std::numeric_limits<double>::infinity());
 }
 
 }  // namespace

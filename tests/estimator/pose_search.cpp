@@ -20,7 +20,7 @@
 namespace narpa {
 namespace {
 
-void add_box(Mesh& mesh, const Vec3& size_m, const Rigid3& T) {
+void append_box(Mesh& mesh, const Vec3& size_m, const Rigid3& T) {
     const auto first = static_cast<std::uint32_t>(mesh.positions.size());
     for (int i = 0; i < 8; ++i)
         mesh.positions.push_back(vec_cast<float>(
@@ -43,16 +43,16 @@ void add_box(Mesh& mesh, const Vec3& size_m, const Rigid3& T) {
 /// A bus, two unlike panels and a mast: no two of its sides are alike.
 Mesh small_craft() {
     Mesh m;
-    add_box(m, {1.4, 1, 0.9}, {});
-    add_box(m, {0.8, 1.6, 0.06}, {exp_rotation({0, 0.4, 0}), {0.2, 1.3, 0}});
-    add_box(m, {0.6, 0.9, 0.06}, {exp_rotation({0, -0.4, 0}), {-0.1, -0.95, 0.1}});
-    add_box(m, {0.2, 0.2, 1.1}, {{}, {-0.5, 0.3, 0.9}});
+    append_box(m, {1.4, 1, 0.9}, {});
+    append_box(m, {0.8, 1.6, 0.06}, {exp_rotation({0, 0.4, 0}), {0.2, 1.3, 0}});
+    append_box(m, {0.6, 0.9, 0.06}, {exp_rotation({0, -0.4, 0}), {-0.1, -0.95, 0.1}});
+    append_box(m, {0.2, 0.2, 1.1}, {{}, {-0.5, 0.3, 0.9}});
     return m;
 }
 
 Mesh cube() {
     Mesh m;
-    add_box(m, {2, 2, 2}, {});
+    append_box(m, {2, 2, 2}, {});
     return m;
 }
 

@@ -52,7 +52,7 @@ TEST(Response, ToNothingIsBeyondAllLimits) {
     Matrix6 response = Matrix6::Identity();
     response(0, 0) = 0;
     const Matrix6 C = covariance_by_response(Matrix6::Identity(), response);
-    EXPECT_NEAR(C(0, 0), 1 / (kLeastShown * kLeastShown), 1);
+    EXPECT_NEAR(C(0, 0), 1 / (kMinShown * kMinShown), 1);
     EXPECT_NEAR(C(3, 3), 1, 1e-9);
 }
 

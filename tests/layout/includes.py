@@ -1,7 +1,7 @@
-"""Checks that every #include of a room's files points to the room itself or to a room that it links, and that x.cpp
+"""Checks that every #include of a library's files points to the library itself or to a library that it links, and that x.cpp
 includes x.h before anything else, so that x.h compiles alone.
 
-Usage: includes.py ROOMS SOURCE_DIR    ROOMS: lines of "folder: linked linked ..."
+Usage: includes.py LIBRARIES SOURCE_DIR    LIBRARIES: lines of "folder: linked linked ..."
 """
 import pathlib
 import re
@@ -10,13 +10,13 @@ import sys
 lists, root = pathlib.Path(sys.argv[1]).read_text(), pathlib.Path(sys.argv[2])
 links = {}
 for line in lists.splitlines():
-    room, _, linked = line.partition(":")
-    links[room.strip()] = linked.split()
+    library, _, linked = line.partition(":")
+    links[library.strip()] = linked.split()
 
 
-def reachable(room):
-    """The room and all that it links, directly or through others; "renderer" stands for every room below it."""
-    seen, todo = set(), [room]
+def reachable(library):
+    """The library and all that it links, directly or through others; "renderer" stands for every library below it."""
+    seen, todo = set(), [library]
     while todo:
         here = todo.pop()
         if here in seen:
@@ -26,7 +26,7 @@ def reachable(room):
     return seen
 
 
-def room_of(path):
+def library_of(path):
     parts = path.split("/")
     for depth in (2, 1):
         candidate = "/".join(parts[:depth])
@@ -36,9 +36,9 @@ def room_of(path):
 
 
 wrong = []
-for room in links:
-    allowed = reachable(room)
-    for file in sorted((root / room).rglob("*")):
+for library in links:
+    allowed = reachable(library)
+    for file in sorted((root / library).rglob("*")):
         if file.suffix not in (".h", ".cpp"):
             continue
         lines = file.read_text().splitlines()
@@ -48,7 +48,7 @@ for room in links:
             wrong.append(f"{file.relative_to(root)}: does not include {header.name} first")
         for number, line in enumerate(lines, 1):
             include = re.match(r'#include "([^"]+)"', line)
-            if include and (target := room_of(include[1])) and target not in allowed:
-                wrong.append(f"{file.relative_to(root)}:{number}: {room} does not link {target}: {include[1]}")
-print("\n".join(wrong) or f"{len(links)} rooms: every include points down")
+            if include and (target := library_of(include[1])) and target not in allowed:
+                wrong.append(f"{file.relative_to(root)}:{number}: {library} does not link {target}: {include[1]}")
+print("\n".join(wrong) or f"{len(links)} libraries: every include points down")
 sys.exit(bool(wrong))

@@ -143,14 +143,14 @@ TEST_P(Os1Profiles, PacketsDecodeToWhatWasMeasured) {
 TEST_P(Os1Profiles, RangesBeyondTheFieldAreNone) {
     const auto unit = os1_unit(16, 512, 10, GetParam());
     std::vector<LidarEchoes> echoes(unit->spec().shots_per_packet);
-    const double most_m = unit->spec().range_m_max;
-    const double ranges[] = {most_m, std::nextafter(most_m, 1e9), std::nan(""), -1, 1e300, INFINITY};
+    const double max_m = unit->spec().range_m_max;
+    const double ranges[] = {max_m, std::nextafter(max_m, 1e9), std::nan(""), -1, 1e300, INFINITY};
     for (std::size_t i = 0; i < std::size(ranges); ++i) echoes[i].strongest = {ranges[i], 1e30f};
     std::vector<std::uint8_t> bytes(unit->spec().data_packet_bytes);
     unit->encode(0, kEpoch_ns, echoes, bytes);
     std::vector<LidarPoint> points(unit->spec().points_per_packet);
     ASSERT_EQ(unit->points(bytes, points), 1u);
-    EXPECT_NEAR(points[0].range_m, most_m, 1e-9);
+    EXPECT_NEAR(points[0].range_m, max_m, 1e-9);
     EXPECT_EQ(points[0].intensity, 255);
 
     std::vector<LidarShot> shots(echoes.size());

@@ -162,14 +162,14 @@ TEST(RigidBody, RotationAboutTheIntermediateAxisFlipsAndReturns) {
     const RigidBody body(J);
     Attitude a{{}, {1e-3, 1, 0}};
     const Invariants before = invariants(J, a);
-    double least = 1, most_after = -1;
+    double least = 1, max_after = -1;
     for (int i = 0; i < 60'000; ++i) {
         a = body.turned(a, {}, 1e-3);
         least = std::min(least, a.rate_rad_s.y);
-        if (least < -0.999) most_after = std::max(most_after, a.rate_rad_s.y);
+        if (least < -0.999) max_after = std::max(max_after, a.rate_rad_s.y);
     }
     EXPECT_LT(least, -0.999);
-    EXPECT_GT(most_after, 0.999);
+    EXPECT_GT(max_after, 0.999);
     EXPECT_NEAR(invariants(J, a).energy_j / before.energy_j, 1, 1e-10);
 }
 

@@ -105,7 +105,7 @@ TEST(EngineControl, HoversOnItsWeight) {
     r.q_port_chaser_port = T_port_docked().q;
     const RelativeMotion m = upright(s, r.position_m);
     const Impulses i = control.step(0, m, r);
-    const double weight = s.chaser.mass_kg * norm(s.orbit.fall_m_s2(0, m.position_m));
+    const double weight = s.chaser.mass_kg * norm(s.orbit.relative_free_fall_m_s2(0, m.position_m));
     EXPECT_NEAR(i.linear_n_s.z, weight * s.navigation.period_s, 1e-3 * weight);
     EXPECT_LT(std::hypot(i.linear_n_s.x, i.linear_n_s.y), 1e-3 * weight);
 }

@@ -213,7 +213,7 @@ TEST_F(OnGround, ADropTouchesDownAfterTheTimeOfFreeFallAndComesToRestOnItsFeet) 
     Simulation dropped = simulation(s);
     EXPECT_NEAR(dropped.clearance_m().value(), 2, 1e-9);
     ASSERT_EQ(next_phase(dropped), DynamicsPhase::touched_down);
-    const double g = norm(s.orbit.fall_m_s2(0, {}));
+    const double g = norm(s.orbit.relative_free_fall_m_s2(0, {}));
     EXPECT_NEAR(to_seconds(dropped.t_ns()), std::sqrt(4 / g), 0.002);  // the steps before are of 1 ms
     EXPECT_NEAR(dropped.contact()->port.closing_m_s(), std::sqrt(4 * g), 0.01);
     ASSERT_EQ(next_phase(dropped), DynamicsPhase::landed);
@@ -231,7 +231,7 @@ TEST_F(OnGround, AtRestTheFeetCarryTheWeightWithoutATorque) {
     GroundContact feet(*s.gear, terrain_);
     const PortState p = dropped.port();
     const GroundForces f = feet.press(p);  // without the friction that has built up
-    const double weight = 500 * norm(s.orbit.fall_m_s2(0, {}));
+    const double weight = 500 * norm(s.orbit.relative_free_fall_m_s2(0, {}));
     EXPECT_NEAR(f.force_n.x, weight, 0.02 * weight);
     EXPECT_NEAR(p.pitch_yaw_rad(), std::atan(0.1), 0.02);  // it leans with the ground
 }

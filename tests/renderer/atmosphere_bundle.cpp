@@ -52,12 +52,12 @@ auto down_to(double from_m, auto&& height_of) {
 
 /// Against the integral along each ray. Nodes agree to kTolerance with values between them; what lies elsewhere in
 /// a cell may be somewhat farther off.
-constexpr double kMostOff = 2 * static_cast<double>(RayBundle::kTolerance);
+constexpr double kMaxOff = 2 * static_cast<double>(RayBundle::kTolerance);
 struct Comparison {
     double most = 0;  ///< relative difference of a band
     std::size_t integrals = 0;
 };
-Comparison compare(double height_m, const Rays& rays, const Vec3& to_sun, AirCells& cells) {
+Comparison compare(double height_m, const Rays& rays, const Vec3& to_sun, AirCache& cells) {
     const Vec3 origin{0, 0, radius_m() + height_m};
     std::vector<AirLight> found(rays.size());
     RayBundle bundle(hazy_earth(), origin, &to_sun, cells);
@@ -77,7 +77,7 @@ Comparison compare(double height_m, const Rays& rays, const Vec3& to_sun, AirCel
     return c;
 }
 Comparison compare(double height_m, const Rays& rays, const Vec3& to_sun) {
-    AirCells cells;
+    AirCache cells;
     return compare(height_m, rays, to_sun, cells);
 }
 
@@ -85,18 +85,18 @@ TEST(RayBundle, OfTheSkyTakesACellOrAFew) {
     for (const double sun : {60.0, 20.0, 5.0, -3.0})
         for (const double elevation : {10.0, 30.0, 80.0}) {
             const Comparison c = compare(2, tile(elevation, 40, kToSpace), direction_at(sun, 0));
-            EXPECT_LE(c.most, kMostOff) << sun << " " << elevation;
+            EXPECT_LE(c.most, kMaxOff) << sun << " " << elevation;
             EXPECT_LE(c.integrals, 64U) << sun << " " << elevation;
         }
 }
 
 TEST(RayBundle, NeighboursShareCells) {
-    AirCells cells;
+    AirCache cells;
     std::size_t integrals = 0;
     for (int x = 0; x < 20; ++x) {
         const Comparison c =
             compare(2, tile(5 + 0.8 * (x % 4), 30 + 0.8 * (x / 4), kToSpace), direction_at(30, 0), cells);
-        EXPECT_LE(c.most, kMostOff);
+        EXPECT_LE(c.most, kMaxOff);
         integrals += c.integrals;
     }
     EXPECT_LE(integrals, 20U * 8U);
@@ -110,7 +110,7 @@ TEST(RayBundle, WhatIsFoundChangesNothing) {
     const Vec3 origin{0, 0, radius_m() + 2}, to_sun = direction_at(5, 0);
     const Rays rays = tile(-0.3, 40, kToSpace);
     std::vector<AirLight> alone(rays.size()), among_others(rays.size());
-    AirCells fresh, used;
+    AirCache fresh, used;
     RayBundle(hazy_earth(), origin, &to_sun, fresh).trace(rays, alone);
     for (int x = 0; x < 40; ++x)
         (void)compare(2, tile(-1 + 0.2 * (x % 8), 30 + 0.7 * (x / 8), kToSpace), to_sun, used);
@@ -124,10 +124,10 @@ TEST(RayBundle, WhatIsFoundChangesNothing) {
 TEST(RayBundle, IsDividedAtTheHorizonAndAtTheLimb) {
     for (const double sun : {60.0, 5.0, -3.0}) {
         const Comparison horizon = compare(2, tile(-0.3, 40, kToSpace), direction_at(sun, 0));
-        EXPECT_LE(horizon.most, kMostOff);
+        EXPECT_LE(horizon.most, kMaxOff);
         // From 400 km the ground's limb is 19.8 degrees down, and the air's top 17.
         const Comparison limb = compare(400'000, tile(-19.9, 40, kToSpace), direction_at(sun, 0));
-        EXPECT_LE(limb.most, kMostOff);
+        EXPECT_LE(limb.most, kMaxOff);
         EXPECT_GT(limb.integrals, 13U);
     }
 }
@@ -136,20 +136,20 @@ TEST(RayBundle, OfTheGroundFromOrbitTakesACellOrTwo) {
     for (const double elevation : {-30.0, -60.0, -90.2}) {
         const Comparison c = compare(400'000, tile(elevation, 40, down_to(400'000, [](int, int) { return 0.0; })),
                                      direction_at(30, 0));
-        EXPECT_LE(c.most, kMostOff) << elevation;
+        EXPECT_LE(c.most, kMaxOff) << elevation;
         EXPECT_LE(c.integrals, 26U) << elevation;
     }
 }
 
 TEST(RayBundle, OfTheGroundUnderfootReachesToTheHorizon) {
-    AirCells cells;
+    AirCache cells;
     std::size_t integrals = 0;
     for (int x = 0; x < 40; ++x) {
         const double down = -1.3 - 0.8 * (x / 8);
         const Comparison c =
             compare(100, tile(down, 20 + 0.8 * (x % 8), down_to(100, [](int, int) { return 0.0; })),
                     direction_at(30, 0), cells);
-        EXPECT_LE(c.most, kMostOff) << down;
+        EXPECT_LE(c.most, kMaxOff) << down;
         integrals += c.integrals;
     }
     EXPECT_LE(integrals, 40U * 13U);
@@ -157,13 +157,13 @@ TEST(RayBundle, OfTheGroundUnderfootReachesToTheHorizon) {
 
 TEST(RayBundle, OfMountainsTakesCellsBetweenLayers) {
     const auto heights = [](int x, int y) { return 2000 + 100 * std::sin(1.7 * x) * std::cos(2.3 * y); };
-    AirCells cells;
+    AirCache cells;
     std::size_t integrals = 0;
     for (int x = 0; x < 40; ++x) {
         const Comparison c =
             compare(400'000, tile(-60 + 0.8 * (x % 8), 40 + 0.8 * (x / 8), down_to(400'000, heights)),
                     direction_at(30, 0), cells);
-        EXPECT_LE(c.most, kMostOff);
+        EXPECT_LE(c.most, kMaxOff);
         integrals += c.integrals;
     }
     EXPECT_LE(integrals, 40U * 13U);
@@ -180,7 +180,7 @@ TEST(RayBundle, BeyondTheAirIsASpaceLikeAnyOther) {
     // A station above the air, half of the tile, before empty sky.
     const Rays rays = tile(40, 40, [](const Vec3&, int x, int) { return x < kSide / 2 ? 6e5 : kInfinity; });
     const Comparison c = compare(2, rays, direction_at(30, 0));
-    EXPECT_LE(c.most, kMostOff);
+    EXPECT_LE(c.most, kMaxOff);
     EXPECT_LE(c.integrals, 26U);
 }
 
@@ -188,7 +188,7 @@ TEST(RayBundle, WithoutASunItDimsAlone) {
     const Rays rays = tile(10, 40, kToSpace);
     std::vector<AirLight> found(rays.size());
     const Vec3 origin{0, 0, radius_m() + 2};
-    AirCells cells;
+    AirCache cells;
     RayBundle(hazy_earth(), origin, nullptr, cells).trace(rays, found);
     for (std::size_t i = 0; i < rays.size(); ++i) {
         const AirLight exact = air_along(hazy_earth(), origin, rays[i].direction, kInfinity, nullptr);
@@ -206,26 +206,26 @@ AirCell cell_of(float value, std::uint32_t layers) {
     return cell;
 }
 
-TEST(AirCells, AreFoundByTheirKeyAlone) {
-    AirCells cells;
+TEST(AirCache, AreFoundByTheirKeyAlone) {
+    AirCache cells;
     AirCell found;
     EXPECT_FALSE(cells.find(1, found));
     cells.store(1, cell_of(0.5f, 2));
-    EXPECT_FALSE(cells.find(1 + AirCells::kEntries, found));
+    EXPECT_FALSE(cells.find(1 + AirCache::kEntries, found));
     ASSERT_TRUE(cells.find(1, found));
     EXPECT_EQ(found.layers, 2U);
     EXPECT_EQ(found.nodes[17].in_scattering.z, 0.5f);
     AirCell divided;
     divided.layers = 1, divided.differs = AirCell::kAlongV;
-    cells.store(1 + AirCells::kEntries, divided);
+    cells.store(1 + AirCache::kEntries, divided);
     EXPECT_FALSE(cells.find(1, found));
-    ASSERT_TRUE(cells.find(1 + AirCells::kEntries, found));
+    ASSERT_TRUE(cells.find(1 + AirCache::kEntries, found));
     EXPECT_EQ(found.differs, AirCell::kAlongV);
 }
 
 /// Threads that write one entry at once: what is found is always what one of them wrote.
-TEST(AirCells, AreNeverFoundTorn) {
-    AirCells cells;
+TEST(AirCache, AreNeverFoundTorn) {
+    AirCache cells;
     std::vector<std::thread> threads;
     std::array<std::size_t, 4> found{};
     std::array<bool, 4> torn{};
@@ -233,9 +233,9 @@ TEST(AirCells, AreNeverFoundTorn) {
         threads.emplace_back([&, t] {
             AirCell cell;
             for (std::size_t i = 0; i < 20'000; ++i) {
-                const std::uint64_t key = 7 + AirCells::kEntries * ((i + t) % 4);
+                const std::uint64_t key = 7 + AirCache::kEntries * ((i + t) % 4);
                 cells.store(key, cell_of(static_cast<float>((i + t) % 4), 2));
-                const std::uint64_t other = 7 + AirCells::kEntries * (i % 3);
+                const std::uint64_t other = 7 + AirCache::kEntries * (i % 3);
                 if (!cells.find(other, cell)) continue;
                 ++found[t];
                 for (std::size_t k = 0; k < 18; ++k)

@@ -100,13 +100,13 @@ inline Shown render(const BudgetView& v, const FrameSettings& s) {
 
 /// What a frame of 2 spp by paths takes on this machine: the least of five.
 inline std::int64_t ns_of_two_samples(CameraRenderer& renderer, const BudgetView& v) {
-    std::int64_t least_ns = std::numeric_limits<std::int64_t>::max();
+    std::int64_t min_ns = std::numeric_limits<std::int64_t>::max();
     for (std::uint32_t k = 0; k < 5; ++k) {
         const std::int64_t start = now_ns();
         render(renderer, v, samples_a_pixel(v, 2, k, RenderSettings::Method::path));
-        least_ns = std::min(least_ns, now_ns() - start);
+        min_ns = std::min(min_ns, now_ns() - start);
     }
-    return least_ns;
+    return min_ns;
 }
 
 inline bool same_bytes(const RadianceImage& a, const RadianceImage& b) {

@@ -139,10 +139,10 @@ TEST(PointSpreadFunction, IsTheSameOnAnyNumberOfThreads) {
     for (std::size_t i = 0; i < in.pixels.size(); i += 7) in.pixels[i] = {static_cast<float>(i), 1, 0};
     ImageOptics optics(c);
     optics.apply(in, many);
-    optics.add_veil(many);
+    optics.add_veiling_glare(many);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
     optics.apply(in, one);
-    optics.add_veil(one);
+    optics.add_veiling_glare(one);
     EXPECT_EQ(one.pixels, many.pixels);
 }
 
@@ -169,7 +169,7 @@ TEST(VeilingGlare, SpreadsItsShareEvenly) {
     RadianceImage in(20, 10), out(20, 10);
     in.pixels[33] = {100, 0, 0};
     optics.apply(in, out);
-    optics.add_veil(out);
+    optics.add_veiling_glare(out);
     EXPECT_NEAR(out.pixels[0].x, 0.05 * 100 / 200, 1e-6);
     EXPECT_NEAR(out.pixels[33].x, 95 + 0.05 * 100 / 200, 1e-4);
 }

@@ -46,7 +46,7 @@ TEST(LidarAir, OfEvenAirIsTheLidarEquation) {
     ASSERT_GT(c.gas_scattering, 4e-4);
     const double pi_beta = std::numbers::pi * c.gas_scattering * 3 / (8 * std::numbers::pi);
     const Vec3 from{0, 0, description.ground_radius_m + 10}, level{1, 0, 0};
-    EXPECT_NEAR(air.most_1_m(), pi_beta, 1e-9 * pi_beta);
+    EXPECT_NEAR(air.max_1_m(), pi_beta, 1e-9 * pi_beta);
     for (const auto& [near_m, far_m] : {std::pair{0.9, 1.8}, {5.0, 5.9}, {100.0, 101.0}, {400.0, 800.0}}) {
         const LidarAir::Return back = air.backscattered(from, level, near_m, far_m);
         const double expected = lidar_equation(pi_beta, c.gas_scattering, near_m, far_m);
@@ -104,7 +104,7 @@ public:
                                                 double to_m) const noexcept override {
         return {lidar_equation(pi_beta_1_m_, alpha_1_m_, from_m, to_m), 0.5 * (from_m + to_m)};
     }
-    [[nodiscard]] double most_lidar_backscatter_1_m() const noexcept override { return pi_beta_1_m_; }
+    [[nodiscard]] double max_lidar_backscatter_1_m() const noexcept override { return pi_beta_1_m_; }
 
 private:
     double pi_beta_1_m_, alpha_1_m_;
@@ -122,7 +122,7 @@ std::vector<LidarEchoes> shots_in(const Medium* medium, const LidarReceiverModel
 }
 
 /// 10 % at 1000 m: the least light is 1e-7; fog of pi beta * gate = 1e-5 crosses it up to 10 m.
-constexpr double kPiBeta_1_m = 1e-5 / kGate_m, kLeast = 1e-7;
+constexpr double kPiBeta_1_m = 1e-5 / kGate_m, kMin = 1e-7;
 LidarReceiverModel receiver_from(double range_min_m, double snr = 0) {
     return {
         .pulse_length_m = kGate_m, .range_min_m = range_min_m, .range_at_10_percent_m = 1000, .detection_snr = snr};
@@ -171,7 +171,7 @@ TEST(LidarInFog, FalseEchoesComeAsOftenAsTheThresholdSays) {
     constexpr std::size_t kShots = 20'000;
     double missed = 1;
     for (double r = kFrom_m; r < 30; r += kGate_m) {
-        const double x = lidar_equation(kPiBeta_1_m, 0, r, r + kGate_m) / kLeast;
+        const double x = lidar_equation(kPiBeta_1_m, 0, r, r + kGate_m) / kMin;
         missed *= 1 - 0.5 * std::erfc(kSnr * (1 - x) / std::numbers::sqrt2);
     }
     const auto shots = shots_in(&fog, receiver_from(kFrom_m, kSnr), 0, kShots);

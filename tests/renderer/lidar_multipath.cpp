@@ -201,14 +201,14 @@ TEST(LidarMultipath, LightThatIsLaterThanAPulseIsAnEchoOfItsOwn) {
     room.add_plate(4, 4, exp_rotation({0, kPi, 0}), {0, 0, 5});
     room.add_plate(4, 4, {}, {0, 0, -4});
     room.lidar.receiver.pulse_length_m = 0.6;
-    const double least_m = 0.5 * (5 + 9 + 4), most_m = least_m + 1.5;
+    const double min_m = 0.5 * (5 + 9 + 4), max_m = min_m + 1.5;
     std::size_t late = 0;
     for (const LidarEchoes& e : room.shoot({0, 0, 1}, 500)) {
         EXPECT_NEAR(e.strongest.range_m, 5, 1e-9);
         if (e.second.range_m == 0) continue;
         ++late;
-        EXPECT_GT(e.second.range_m, least_m);
-        EXPECT_LT(e.second.range_m, most_m);
+        EXPECT_GT(e.second.range_m, min_m);
+        EXPECT_LT(e.second.range_m, max_m);
         EXPECT_EQ(e.last.range_m, e.second.range_m);
     }
     EXPECT_GT(late, 400u);

@@ -298,14 +298,14 @@ TEST(TileCulling, ListsAllWhereMoreCrowdThanItCounts) {
     camera.cx = camera.cy = 27.5;  // the middle of a tile
     TileCulling cover(tracer, camera);
     BodyPoses at(scene.bodies.size());
-    for (const std::size_t crowd : {TileCulling::kMostListed, TileCulling::kMostListed + 1}) {
+    for (const std::size_t crowd : {TileCulling::kMaxListed, TileCulling::kMaxListed + 1}) {
         for (std::size_t b = 0; b < 40; ++b)
             at.set(b, {{}, {0, 0, b % 2 == 0 && b / 2 < crowd ? 20.0 + static_cast<double>(b) : -5.0}});
         cover.update(at, {}, nullptr);
         const auto listed = cover.bodies(3, 3);
-        EXPECT_EQ(listed.size(), crowd <= TileCulling::kMostListed ? crowd : 40);
+        EXPECT_EQ(listed.size(), crowd <= TileCulling::kMaxListed ? crowd : 40);
         for (std::size_t i = 0; i < listed.size(); ++i)
-            EXPECT_EQ(listed[i], crowd <= TileCulling::kMostListed ? 2 * i : i);
+            EXPECT_EQ(listed[i], crowd <= TileCulling::kMaxListed ? 2 * i : i);
         EXPECT_TRUE(cover.bodies(0, 0).empty());
     }
 }

@@ -12,9 +12,9 @@ namespace narpa::test {
 
 class EquidistantCamera final : public CameraModel {
 public:
-    /// fx, fy: px per radian; `most_rad`: the image circle.
-    EquidistantCamera(double fx, double fy, double cx, double cy, double most_rad = 3.1)
-        : fx_(fx), fy_(fy), cx_(cx), cy_(cy), most_rad_(most_rad) {}
+    /// fx, fy: px per radian; `max_rad`: the image circle.
+    EquidistantCamera(double fx, double fy, double cx, double cy, double max_rad = 3.1)
+        : fx_(fx), fy_(fy), cx_(cx), cy_(cy), max_rad_(max_rad) {}
 
     [[nodiscard]] Vec3 direction(const ImagePoint& p) const noexcept override {
         const double a = (p.x - cx_) / fx_, b = (p.y - cy_) / fy_, theta = std::hypot(a, b);
@@ -23,7 +23,7 @@ public:
     }
     [[nodiscard]] std::optional<ImagePoint> project(const Vec3& p) const noexcept override {
         const double side = std::hypot(p.x, p.y), theta = std::atan2(side, p.z);
-        if (!(theta < most_rad_)) return std::nullopt;
+        if (!(theta < max_rad_)) return std::nullopt;
         const double k = side > 0 ? theta / side : 1 / p.z;
         return ImagePoint{cx_ + fx_ * k * p.x, cy_ + fy_ * k * p.y};
     }
@@ -36,7 +36,7 @@ public:
                 fy_ * Vec3{(along - k) * c * s, along * s * s + k * c * c, -side * s / square}};
     }
     [[nodiscard]] bool sees(const ImagePoint& p) const noexcept override {
-        return std::hypot((p.x - cx_) / fx_, (p.y - cy_) / fy_) < most_rad_;
+        return std::hypot((p.x - cx_) / fx_, (p.y - cy_) / fy_) < max_rad_;
     }
     [[nodiscard]] double pixels_per_radian() const noexcept override { return fx_; }
     /// Directions are nowhere further apart than their image points, in radians.
@@ -46,21 +46,21 @@ public:
     }
     [[nodiscard]] std::shared_ptr<const CameraModel> scaled(double x, double y) const override {
         return std::make_shared<EquidistantCamera>(fx_ * x, fy_ * y, (cx_ + 0.5) * x - 0.5, (cy_ + 0.5) * y - 0.5,
-                                                   most_rad_);
+                                                   max_rad_);
     }
     [[nodiscard]] std::shared_ptr<const CameraModel> windowed(double x, double y) const override {
-        return std::make_shared<EquidistantCamera>(fx_, fy_, cx_ - x, cy_ - y, most_rad_);
+        return std::make_shared<EquidistantCamera>(fx_, fy_, cx_ - x, cy_ - y, max_rad_);
     }
 
 private:
-    double fx_, fy_, cx_, cy_, most_rad_;
+    double fx_, fy_, cx_, cy_, max_rad_;
 };
 
 /// A camera of this kind with its axis through the middle of the image.
-inline Camera with_equidistant(Camera c, double pixels_per_radian, double most_rad = 3.1) {
+inline Camera with_equidistant(Camera c, double pixels_per_radian, double max_rad = 3.1) {
     c.fx = c.fy = c.cx = c.cy = std::nan("");  // nothing may use them
     c.model = std::make_shared<EquidistantCamera>(pixels_per_radian, pixels_per_radian, (c.width - 1) / 2.0,
-                                                  (c.height - 1) / 2.0, most_rad);
+                                                  (c.height - 1) / 2.0, max_rad);
     return c;
 }
 

@@ -18,7 +18,7 @@ public:
     }
     [[nodiscard]] int columns() const override { return columns_; }
     [[nodiscard]] int rows() const override { return rows_; }
-    [[nodiscard]] bool goes_around() const override { return around_; }
+    [[nodiscard]] bool is_global() const override { return around_; }
     [[nodiscard]] bool read_rows(int row, int count, double* heights) override {
         const auto width = static_cast<std::size_t>(columns_);
         std::copy_n(heights_.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(row) * width),

@@ -1,7 +1,7 @@
-// Writes ggx_table.cpp: how much a rough GGX surface reflects on the first bounce. The integrals are means over
-// visible normals (E. Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 7, 2018): E = <G2/G1> is the
-// albedo with F = 1, and <F G2/G1> / E a mean Fresnel reflectance, kept as the one cosine at which Fresnel's
-// equations give it.
+// Writes ggx_table.cpp: the first-bounce reflectance of a rough GGX surface. The integrals are means over visible
+// normals (E. Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 7, 2018): E = <G2/G1> is the albedo
+// with F = 1, and <F G2/G1> / E a mean Fresnel reflectance, stored as the cosine at which Fresnel's equations give
+// it.
 #include <cstdio>
 #include <numbers>
 #include <span>
@@ -15,7 +15,7 @@ namespace {
 
 /// Points per axis of the integrals over normals and over the hemisphere.
 constexpr int kNormals = 128, kMeanSteps = 2000;
-/// Above what interpolation errs, so that no light is ever made.
+/// Larger than the interpolation error, so that no energy is gained.
 constexpr double kAlbedoMargin = 0.001, kCosineMargin = 0.985;
 
 double index_of_node(int k) {
@@ -26,7 +26,7 @@ double power_5(double x) {
     return x * x * x * x * x;
 }
 
-/// Means of F G2 / G1 over the visible normals, F each of fresnel(cosine).
+/// Means of F G2 / G1 over the visible normals, for each F that fresnel(cosine) returns.
 template <std::size_t N, class Fresnel>
 std::array<double, N> first_bounce(double alpha, double mu, Fresnel&& fresnel) {
     const auto smith = [&](double z) { return 0.5 * (std::sqrt(1 + alpha * alpha * (1 - z * z) / (z * z)) - 1); };
@@ -73,7 +73,7 @@ double hemispherical(F&& f) {
 }
 
 void set_cosines(Tables& t, int i, int j, double alpha, double mu) {
-    // Of each index, of Schlick's power, E.
+    // Means for each index, for Schlick's power, and E.
     const auto means = first_bounce<kIndices + 2>(alpha, mu, [](double c) {
         std::array<double, kIndices + 2> f;
         for (int k = 0; k < kIndices; ++k) f[static_cast<std::size_t>(k)] = fresnel_dielectric(c, index_of_node(k));
@@ -128,7 +128,7 @@ int main() {
     std::printf(
         "#include \"renderer/material/ggx_table.h\"\n\nconst narpa::ggx_table::Tables "
         "narpa::ggx_table::kTables = {\n");
-    // Braces of the tables within are left out.
+    // Inner braces are omitted.
     narpa::ggx_table::write(t.albedo.values);
     narpa::ggx_table::write(t.mean_albedo);
     for (const auto& table : t.cosine) narpa::ggx_table::write(table.values);

@@ -252,7 +252,7 @@ TEST(Dem, NoCratersAndRocksAboutAWholePlanet) {
     const MemoryFolder folder;
     DemRequest r = request_of(globe(folder, 0));
     r.on = DemRequest::On::ellipsoid;
-    r.detail.posts_per_post = 2;
+    r.detail.refinement_factor = 2;
     EXPECT_TRUE(read_dem_in_process(r));
     for (const bool rocks : {false, true}) {
         (rocks ? r.detail.rocks : r.detail.craters) = 0.1;
@@ -262,7 +262,7 @@ TEST(Dem, NoCratersAndRocksAboutAWholePlanet) {
         r.detail.craters = 0;
     }
     DemRequest part = request_of(dem_file("mars.tif"));
-    part.detail = {.posts_per_post = 2, .craters = 0.01};
+    part.detail = {.refinement_factor = 2, .craters = 0.01};
     EXPECT_TRUE(read_dem_in_process(part));
 }
 

@@ -44,21 +44,21 @@ TEST(Rotation, TheSunIsOverGreenwichAtNoonAndOverTheEquatorAtEquinox) {
 
 TEST(Rotation, RatesAreThePublishedOnes) {
     const auto day_s = [](const char* body) {
-        return 2 * std::numbers::pi / norm(turning_of(body, kEquinox2026_ns)->rate_rad_s);
+        return 2 * std::numbers::pi / norm(body_rotation_of(body, kEquinox2026_ns)->rate_rad_s);
     };
     EXPECT_NEAR(day_s("earth"), 86164.1, 0.01);
     EXPECT_NEAR(day_s("mars"), 88642.66, 0.05);
     EXPECT_NEAR(day_s("moon"), 27.32166 * 86400, 0.001 * 27.3 * 86400);
     EXPECT_NEAR(day_s("jupiter"), 9 * 3600 + 55 * 60 + 29.71, 0.02);
     EXPECT_NEAR(day_s("vesta"), 5.342 * 3600, 5);
-    EXPECT_LT(turning_of("venus", kEquinox2026_ns)->rate_rad_s.z, 0);
+    EXPECT_LT(body_rotation_of("venus", kEquinox2026_ns)->rate_rad_s.z, 0);
     EXPECT_FALSE(q_icrs_body("vulcan", 0));
-    for (const std::string_view name : kRotatingBodies) EXPECT_TRUE(turning_of(name, 0)) << name;
+    for (const std::string_view name : kRotatingBodies) EXPECT_TRUE(body_rotation_of(name, 0)) << name;
 }
 
 TEST(Rotation, TheRateTakesTheBodyOn) {
     for (const char* body : {"earth", "mars", "moon"}) {
-        const Turning now = *turning_of(body, kEquinox2026_ns);
+        const BodyRotation now = *body_rotation_of(body, kEquinox2026_ns);
         const Quat later = *q_icrs_body(body, kEquinox2026_ns + 600'000'000'000);
         EXPECT_LT(angle_between(now.q_icrs_body * exp_rotation(600.0 * now.rate_rad_s), later), 1e-7) << body;
     }

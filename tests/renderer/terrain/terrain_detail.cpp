@@ -19,7 +19,7 @@ std::vector<double> all_of(HeightSource& source) {
 TEST(TerrainDetail, WithoutFeaturesItIsSmoothThroughThePosts) {
     const auto bowl = [](double c, double r) { return 0.3 * c * c - 0.2 * c * r + 0.1 * r * r - 4 * c + r; };
     HeightGrid grid(20, 17, bowl);
-    DetailedSource fine(grid, {1, 1}, {.posts_per_post = 4});
+    DetailedSource fine(grid, {1, 1}, {.refinement_factor = 4});
     EXPECT_EQ(fine.columns(), 19 * 4 + 1);
     EXPECT_EQ(fine.rows(), 16 * 4 + 1);
     const std::vector<double> h = all_of(fine);
@@ -37,7 +37,7 @@ TEST(TerrainDetail, WithoutFeaturesItIsSmoothThroughThePosts) {
 TEST(TerrainDetail, BesideAHoleItIsTheTrianglesOfTheDem) {
     const auto ground = [](int c, int r) { return c == 9 && r == 8 ? kNoHeight : rough_ground(c, r); };
     HeightGrid grid(20, 17, ground);
-    DetailedSource fine(grid, {1, 1}, {.posts_per_post = 4});
+    DetailedSource fine(grid, {1, 1}, {.refinement_factor = 4});
     const std::vector<double> h = all_of(fine);
     int holes = 0;
     for (int r = 6 * 4 + 1; r < 10 * 4; ++r)
@@ -60,7 +60,7 @@ TEST(TerrainDetail, BesideAHoleItIsTheTrianglesOfTheDem) {
 TEST(TerrainDetail, APlanetHasNoSeam) {
     const auto bumps = [](int c, int r) { return std::sin(2 * 3.14159265358979 * (c % 24) / 24) * r; };
     HeightGrid grid(25, 9, bumps, true);
-    DetailedSource fine(grid, {1, 1}, {.posts_per_post = 4});
+    DetailedSource fine(grid, {1, 1}, {.refinement_factor = 4});
     const std::vector<double> h = all_of(fine);
     const auto at = [&](int c, int r) { return h[static_cast<std::size_t>(r * fine.columns() + c)]; };
     for (int r = 0; r < fine.rows(); ++r) {
@@ -72,7 +72,7 @@ TEST(TerrainDetail, APlanetHasNoSeam) {
 
 TEST(TerrainDetail, WindowsAreTheSameHoweverTheyAreRead) {
     HeightGrid grid(40, 40, rough_ground);
-    DetailedSource fine(grid, {1, 1}, {.posts_per_post = 8, .craters = 0.079, .rocks = 0.1, .seed = 7});
+    DetailedSource fine(grid, {1, 1}, {.refinement_factor = 8, .craters = 0.079, .rocks = 0.1, .seed = 7});
     const std::vector<double> h = all_of(fine);
     std::vector<double> rows(static_cast<std::size_t>(3 * fine.columns()));
     for (int r = 0; r + 3 <= fine.rows(); r += 3) {
@@ -80,14 +80,14 @@ TEST(TerrainDetail, WindowsAreTheSameHoweverTheyAreRead) {
         for (std::size_t i = 0; i < rows.size(); ++i)
             ASSERT_EQ(rows[i], h[static_cast<std::size_t>(r * fine.columns()) + i]);
     }
-    DetailedSource other(grid, {1, 1}, {.posts_per_post = 8, .craters = 0.079, .rocks = 0.1, .seed = 8});
+    DetailedSource other(grid, {1, 1}, {.refinement_factor = 8, .craters = 0.079, .rocks = 0.1, .seed = 8});
     EXPECT_NE(all_of(other), h);
 }
 
 TEST(TerrainDetail, RocksCoverThePublishedShare) {
     HeightGrid flat(201, 201, [](int, int) { return 0.0; });
     constexpr double kShare = 0.15;
-    DetailedSource fine(flat, {1, 1}, {.posts_per_post = 8, .rocks = kShare, .seed = 3});
+    DetailedSource fine(flat, {1, 1}, {.refinement_factor = 8, .rocks = kShare, .seed = 3});
     const std::vector<double> h = all_of(fine);
     const double covered = static_cast<double>(std::count_if(h.begin(), h.end(), [](double x) { return x > 0; })) /
                            static_cast<double>(h.size());
@@ -102,7 +102,7 @@ TEST(TerrainDetail, FeaturesAreRoundWherePostsStandApartDifferently) {
     for (const bool rocks : {false, true}) {
         DetailedSource fine(
             flat, {0.5, 1},
-            {.posts_per_post = 8, .craters = rocks ? 0 : 0.01, .rocks = rocks ? 0.05 : 0, .seed = 2});
+            {.refinement_factor = 8, .craters = rocks ? 0 : 0.01, .rocks = rocks ? 0.05 : 0, .seed = 2});
         const std::vector<double> h = all_of(fine);
         const auto at = [&](int c, int r) { return h[static_cast<std::size_t>(r * fine.columns() + c)]; };
         double across = 0, down = 0;
@@ -119,7 +119,7 @@ TEST(TerrainDetail, FeaturesAreRoundWherePostsStandApartDifferently) {
 TEST(TerrainDetail, CratersAreAsDeepAndAsManyAsPublished) {
     HeightGrid flat(301, 301, [](int, int) { return 0.0; });
     constexpr double kMany = 0.005;  // few overlap
-    DetailedSource fine(flat, {1, 1}, {.posts_per_post = 8, .craters = kMany, .seed = 5});
+    DetailedSource fine(flat, {1, 1}, {.refinement_factor = 8, .craters = kMany, .seed = 5});
     const std::vector<double> h = all_of(fine);
     double deepest = 0, below = 0;
     for (const double x : h) deepest = std::min(deepest, x), below += x < 0;

@@ -17,8 +17,9 @@ using namespace test;
 const Pinhole kPinhole{400, 440, 130, 95};
 const EquidistantCamera kEquidistant{150, 140, 130, 95};
 const auto kBarrel = distorted(kPinhole, {Distortion::Model::opencv, {-0.1, 0.02, 1e-3, -2e-3, 0.001}});
-const auto kFisheye = distorted({150, 140, 130, 95}, {Distortion::Model::fisheye, {-0.02, 0.004, -0.001, 1e-4}});
-const std::array<const CameraModel*, 4> kModels{&kPinhole, &kEquidistant, kBarrel.get(), kFisheye.get()};
+const auto kFisheyeLens =
+    distorted({150, 140, 130, 95}, {Distortion::Model::fisheye, {-0.02, 0.004, -0.001, 1e-4}});
+const std::array<const CameraModel*, 4> kModels{&kPinhole, &kEquidistant, kBarrel.get(), kFisheyeLens.get()};
 
 void expect_consistent(const CameraModel& model, double reach_px, double tolerance) {
     std::mt19937_64 random(1);

@@ -51,7 +51,7 @@ TEST_F(EquidistantPoints, PnpFindsThePoseWithoutAGuess) {
     for (int trial = 0; trial < 20; ++trial) {
         see(40, 1e-6);
         const PnpSolution& exact = solver.solve(input(1));
-        ASSERT_TRUE(exact.ok()) << in_words(exact.status);
+        ASSERT_TRUE(exact.ok()) << to_text(exact.status);
         EXPECT_LT(error_between(exact.fit.T_camera_body, truth).norm(), 1e-7);
     }
 }
@@ -63,7 +63,7 @@ TEST_F(EquidistantPoints, PnpErrorsMatchTheirCovarianceAndTheBound) {
     for (int trial = 0; trial < kTrials; ++trial) {
         see(40, 0.5);
         const PnpSolution& s = solver.solve(input(0.5));
-        ASSERT_TRUE(s.ok()) << in_words(s.status);
+        ASSERT_TRUE(s.ok()) << to_text(s.status);
         nees += normalised_error_squared(error_between(s.fit.T_camera_body, truth), s.fit.covariance) / kTrials;
         const auto bound = pnp_bound(input(0.5), truth);
         ASSERT_TRUE(bound);
@@ -84,7 +84,7 @@ TEST_F(EquidistantPoints, CeresAgreesAndOutliersAreFound) {
 
     for (std::size_t i = 0; i < pixels.size(); i += 4) pixels[i] = {900, 100 + 10 * static_cast<double>(i)};
     const PnpSolution& s = solver.solve(input(0.5), true);
-    ASSERT_TRUE(s.ok()) << in_words(s.status);
+    ASSERT_TRUE(s.ok()) << to_text(s.status);
     EXPECT_NEAR(static_cast<double>(s.inliers), 30, 2);
     EXPECT_LT(error_between(s.fit.T_camera_body, truth).norm(), 0.02);
 }
@@ -123,7 +123,7 @@ TEST(DistortedPoints, PnpErrorsMatchTheBoundAndIgnoringTheLensDoesNot) {
             }
             const PnpInput input{model, body_m, pixels, kSigma_px};
             const PnpSolution& s = solver.solve(input);
-            ASSERT_TRUE(s.ok()) << in_words(s.status);
+            ASSERT_TRUE(s.ok()) << to_text(s.status);
             const auto bound = pnp_bound(input, truth);
             ASSERT_TRUE(bound);
             const Vector6 error = error_between(s.fit.T_camera_body, truth);

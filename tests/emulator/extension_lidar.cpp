@@ -141,8 +141,7 @@ TEST_F(JointLidar, PacketsOfALockstepRunDecodeToTheGeometry) {
     EXPECT_EQ(lidar.stats().returns, 4U * Fan8::kShots);
     EXPECT_DOUBLE_EQ(lidar.sweeps(), 4);
     EXPECT_EQ(lidar.sinks()[0]->counters().sent, 4U) << "no position packets";
-    EXPECT_NE(lidar.in_words(true).find("fan.pcap: 4 written, 0 dropped"), std::string::npos)
-        << lidar.in_words(true);
+    EXPECT_NE(lidar.to_text(true).find("fan.pcap: 4 written, 0 dropped"), std::string::npos) << lidar.to_text(true);
 
     // As navigation reads them: the turn that ends at 1.5 s, from the third packet.
     const auto datagrams =

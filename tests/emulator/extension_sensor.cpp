@@ -33,7 +33,7 @@ public:
         return Ok{};
     }
     nlohmann::json report() const override { return {{"name", name()}, {"ticks", times_.size()}}; }
-    std::string in_words(bool) const override {
+    std::string to_text(bool) const override {
         return "  counter " + std::string(name()) + ": " + std::to_string(times_.size()) + " ticks\n";
     }
 
@@ -100,7 +100,7 @@ TEST_F(JointSensor, ACounterIsInTheReport) {
     const nlohmann::json document = report(*emulator);
     EXPECT_EQ(document["counters"], nlohmann::json::parse(R"([{"name": "ticks", "ticks": 11}])"));
     EXPECT_EQ(document["cameras"].size(), 1U);
-    EXPECT_NE(in_words(*emulator).find("counter ticks: 11 ticks"), std::string::npos) << in_words(*emulator);
+    EXPECT_NE(to_text(*emulator).find("counter ticks: 11 ticks"), std::string::npos) << to_text(*emulator);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "bench/honesty_scenes.h"
+#include "bench/consistency_scenes.h"
 
 #include <array>
 #include <cmath>
@@ -58,7 +58,7 @@ Mesh prism_mesh(int sides, double radius_m, double height_m, bool smooth) {
     return m;
 }
 
-/// An ellipsoid whose radius waves by `bump` of itself, in rings and columns.
+/// An ellipsoid whose radius varies by the fraction `bump` along rings and columns.
 Mesh rounded_mesh(const Vec3& radii_m, double bump, bool smooth) {
     constexpr int kRings = 40, kColumns = 80;
     Mesh m;
@@ -87,7 +87,7 @@ Mesh rounded_mesh(const Vec3& radii_m, double bump, bool smooth) {
     return m;
 }
 
-/// A bus with two panels, a tilted dish and a mast: nothing of it is symmetric.
+/// A bus with two panels, a tilted dish and a mast: without any symmetry.
 Mesh craft_mesh() {
     Mesh m;
     append_part(m, box_mesh({1.5, 1, 1}), {});
@@ -114,11 +114,11 @@ Mesh detailed_mesh() {
     return m;
 }
 
-struct HonestyShape {
+struct ConsistencyShape {
     std::string_view name;
     Mesh (*mesh)();
 };
-constexpr std::array<HonestyShape, 8> kShapes{{
+constexpr std::array<ConsistencyShape, 8> kShapes{{
     {"detailed", detailed_mesh},
     {"craft", craft_mesh},
     {"cube",
@@ -142,7 +142,7 @@ constexpr std::array<HonestyShape, 8> kShapes{{
 }};
 
 Result<Scene> scene_of_shape(std::string_view target) {
-    for (const HonestyShape& t : kShapes) {
+    for (const ConsistencyShape& t : kShapes) {
         if (t.name != target) continue;
         Scene s;
         s.name = target;
@@ -177,13 +177,13 @@ Result<Scene> scene_of_file(const std::string& file) {
 
 }  // namespace
 
-std::vector<std::string_view> honesty_targets() {
+std::vector<std::string_view> consistency_targets() {
     std::vector<std::string_view> names;
-    for (const HonestyShape& t : kShapes) names.push_back(t.name);
+    for (const ConsistencyShape& t : kShapes) names.push_back(t.name);
     return names;
 }
 
-Result<Scene> honesty_scene(std::string_view target, int size) {
+Result<Scene> consistency_scene(std::string_view target, int size) {
     Result<Scene> s = target.ends_with(".toml") ? scene_of_file(std::string(target)) : scene_of_shape(target);
     if (!s) return s;
     Camera c;

@@ -1,4 +1,4 @@
-#include "bench/honesty.h"
+#include "bench/consistency.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <memory>
 #include <random>
 
-#include "bench/honesty_scenes.h"
+#include "bench/consistency_scenes.h"
 #include "emulator/log/estimate_report.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/dense/dense_alignment.h"
@@ -25,7 +25,7 @@ constexpr double kRadius_m = 2;  ///< of the targets made in code, about
 constexpr RangeNoise kRangeNoise{0.02, 5.1e-5};
 constexpr std::string_view kWrong = "wrong";  ///< the condition that needs another target
 
-/// Of a VLP-16, 100 m, as the estimator believes it: with a detection limit that is not stated.
+/// Return model of a VLP-16 with 100 m of range, as the estimator assumes it: its detection limit is not stated.
 CertainReturn vlp16_returns() {
     Lidar lidar;
     lidar.range_max_m = vlp16().range_m_default;
@@ -47,7 +47,7 @@ struct Draw {
     std::size_t index(std::size_t n) { return static_cast<std::size_t>(random() % n); }
 };
 
-/// The world of a trial: how it differs from the model.
+/// Differences of a trial's world from the estimators' model.
 struct WorldErrors {
     double scale = 1, brightness = 1, focal = 1, range_bias_m = 0, clock_s = 0, distortion = 0;
     Vec3 mesh_m{}, sun_rad{}, boresight_rad{};
@@ -78,7 +78,8 @@ struct WorldErrors {
         c.fx *= focal, c.fy *= focal;
         return s;
     }
-    /// The pose as the sensor has it, for a target whose pose in the believed axes and at the told time is T.
+    /// The pose in the true sensor axes at the true time, for a target whose pose in the assumed axes at the
+    /// reported time is T.
     [[nodiscard]] Rigid3 seen(const Rigid3& T, const ApparentMotion& motion) const {
         return Rigid3{exp_rotation(-boresight_rad), {}} * moved(T, motion, -clock_s);
     }
@@ -114,13 +115,13 @@ struct KnownTarget {
 
 using Targets = std::vector<std::unique_ptr<KnownTarget>>;
 
-Result<Targets> known_targets(const HonestyOptions& o) {
+Result<Targets> known_targets(const ConsistencyOptions& o) {
     Targets targets;
     std::vector<std::string> names = o.targets;
     if (names.empty())
-        for (const std::string_view name : honesty_targets()) names.emplace_back(name);
+        for (const std::string_view name : consistency_targets()) names.emplace_back(name);
     for (const std::string& name : names) {
-        auto scene = honesty_scene(name, o.size);
+        auto scene = consistency_scene(name, o.size);
         if (!scene) return scene.error();
         targets.push_back(std::make_unique<KnownTarget>(*std::move(scene), o.told));
     }
@@ -129,17 +130,17 @@ Result<Targets> known_targets(const HonestyOptions& o) {
 
 class Campaign {
 public:
-    Campaign(const HonestyOptions& o, Targets targets) : o_(o), targets_(std::move(targets)) {
-        for (const std::string_view c : kHonestyConditions)
+    Campaign(const ConsistencyOptions& o, Targets targets) : o_(o), targets_(std::move(targets)) {
+        for (const std::string_view c : kConsistencyConditions)
             if (std::ranges::find(o.conditions, c) != o.conditions.end() ||
                 (o.conditions.empty() && (c != kWrong || targets_.size() > 1)))
                 conditions_.push_back(c);
     }
 
-    HonestyRow trial(const std::string& method, int number) {
+    ConsistencyRow trial(const std::string& method, int number) {
         Draw d{std::mt19937_64(o_.seed * 1'000'003 + static_cast<std::uint64_t>(number))};
         d.random.discard(16);
-        HonestyRow row;
+        ConsistencyRow row;
         row.method = method;
         KnownTarget& target = *targets_[d.index(targets_.size())];
         row.condition = conditions_[d.index(conditions_.size())];
@@ -155,12 +156,13 @@ public:
         row.nees.push_back(normalised_error_squared(error, out.covariance));
         row.rotation_rad.push_back(error.head<3>().norm());
         row.position_of_range.push_back(error.tail<3>().norm() / norm(out.T.t));
-        if (!(row.nees.back() <= kBeyondNees)) ++row.beyond, row.beyond_trials.push_back(number);
+        if (!(row.nees.back() <= kSixSigmaNees)) ++row.beyond, row.beyond_trials.push_back(number);
         return row;
     }
 
 private:
-    /// Looks at the target nearly, from 3 to 10 radii; `beside`: half of it is out of the picture.
+    /// Aimed nearly at the target, from 3 to 8 radii; `far`: from 15 to 40; `beside`: half of it is outside the
+    /// image.
     [[nodiscard]] Rigid3 pose(double radius_m, std::string_view condition, bool lidar, Draw& d) const {
         const double range_m = condition == "far" ? d.uniform(15, 40) * radius_m : d.uniform(3, 8) * radius_m;
         const double half_view = 0.5 / 1.6;
@@ -229,7 +231,7 @@ private:
         return {e->answer, e->T_camera_body, e->covariance};
     }
 
-    /// A VLP-16 at 10 turns a second. `bright`: a tenth of the points are of something else in front; `dark`: most
+    /// A VLP-16 at 10 turns a second. `bright`: a tenth of the points are on another object in front; `dark`: most
     /// are not returned; `blurred`: twice the noise that the estimator is told; `beside`: half of the target is cut
     /// off.
     TrialResult sweep(KnownTarget& target, const std::string& method, std::string_view condition,
@@ -304,7 +306,7 @@ private:
         return {s.answer(), s.fit.T_camera_body, s.fit.covariance + by_model};
     }
 
-    const HonestyOptions& o_;
+    const ConsistencyOptions& o_;
     Targets targets_;
     std::vector<std::string_view> conditions_;
     PnpSolver solver_{64};
@@ -313,7 +315,7 @@ private:
 
 }  // namespace
 
-void HonestyRow::add(const HonestyRow& other) {
+void ConsistencyRow::add(const ConsistencyRow& other) {
     for (std::size_t i = 0; i < answers.size(); ++i) answers[i] += other.answers[i];
     beyond += other.beyond;
     nees.insert(nees.end(), other.nees.begin(), other.nees.end());
@@ -323,25 +325,25 @@ void HonestyRow::add(const HonestyRow& other) {
     beyond_trials.insert(beyond_trials.end(), other.beyond_trials.begin(), other.beyond_trials.end());
 }
 
-Result<std::vector<HonestyRow>> run_honesty(const HonestyOptions& o, int first, TracingThreads& threads,
-                                            const std::function<void(const std::string&)>& progress,
-                                            const StopFlag& stop) {
+Result<std::vector<ConsistencyRow>> run_consistency(const ConsistencyOptions& o, int first, TracingThreads& threads,
+                                                    const std::function<void(const std::string&)>& progress,
+                                                    const StopFlag& stop) {
     auto targets = known_targets(o);
     if (!targets) return targets.error();
     if (targets->size() < 2 && std::ranges::find(o.conditions, kWrong) != o.conditions.end())
         return Error{"condition \"wrong\" shows another target, expected at least two targets"};
     Campaign campaign(o, *std::move(targets));
-    std::map<std::array<std::string, 3>, HonestyRow> rows;
+    std::map<std::array<std::string, 3>, ConsistencyRow> rows;
     for (const std::string& method : o.methods)
         for (int k = first; k < first + o.trials && !stop; ++k) {
             progress(method + ": trial " + std::to_string(k));
-            HonestyRow row;
+            ConsistencyRow row;
             threads.arena.execute([&] { row = campaign.trial(method, k); });
-            HonestyRow& to = rows[{row.method, row.target, row.condition}];
+            ConsistencyRow& to = rows[{row.method, row.target, row.condition}];
             to.method = row.method, to.target = row.target, to.condition = row.condition;
             to.add(row);
         }
-    std::vector<HonestyRow> out;
+    std::vector<ConsistencyRow> out;
     for (auto& [key, row] : rows) out.push_back(std::move(row));
     return out;
 }

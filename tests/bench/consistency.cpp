@@ -1,5 +1,5 @@
-// The campaign of honesty: faults that it found stay found, and of a few trials of each method none lies.
-#include "bench/honesty.h"
+// The campaign of consistency: faults that it found stay found, and of a few trials of each method none lies.
+#include "bench/consistency.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/stop.h"
-#include "bench/honesty_scenes.h"
+#include "bench/consistency_scenes.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
@@ -16,10 +16,10 @@
 namespace narpa {
 namespace {
 
-std::vector<HonestyRow> run(const HonestyOptions& o, int first) {
+std::vector<ConsistencyRow> run(const ConsistencyOptions& o, int first) {
     static TracingThreads threads(0);
     const StopFlag stop{};
-    auto rows = run_honesty(
+    auto rows = run_consistency(
         o, first, threads, [](const std::string&) {}, stop);
     EXPECT_TRUE(rows) << rows.error().what;
     return *std::move(rows);
@@ -32,51 +32,51 @@ std::vector<HonestyRow> run(const HonestyOptions& o, int first) {
 /// and another minimum along the second weakest motion; from 151000 on pixels of which few samples were bright, and
 /// poses further from the guess than that can be off; 162387: a loss that hardly rises over 8 sigma to one side;
 /// 168894: a bent valley.
-TEST(Honesty, DenseTrialsThatLied) {
-    HonestyOptions o;
+TEST(Consistency, DenseTrialsThatLied) {
+    ConsistencyOptions o;
     o.methods = {"dense"};
     o.trials = 1;
     for (const int trial :
          {25,     32,     55,     146,    4,      38,     10,     11704,  10799,  11543,  10026,  10139,
           10296,  10653,  11764,  11229,  10001,  100022, 100450, 101152, 105170, 105816, 140667, 150014,
           151000, 151256, 151758, 151863, 151918, 153136, 153441, 153478, 153674, 162387, 168894})
-        for (const HonestyRow& row : run(o, trial))
+        for (const ConsistencyRow& row : run(o, trial))
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
 
 /// The loss rises as the image says, however much wider an error of the model makes the covariance (nearly all were
 /// refused).
-TEST(Honesty, DenseAnswersWhereTheSizeIsUncertain) {
-    HonestyOptions o;
+TEST(Consistency, DenseAnswersWhereTheSizeIsUncertain) {
+    ConsistencyOptions o;
     o.methods = {"dense"}, o.conditions = {"plain"};
     o.trials = 8;
     o.world.scale = o.told.scale = 0.01;
     int good = 0, beyond = 0;
-    for (const HonestyRow& row : run(o, 0)) good += row.answers[0], beyond += row.beyond;
+    for (const ConsistencyRow& row : run(o, 0)) good += row.answers[0], beyond += row.beyond;
     EXPECT_GE(good, 5);
     EXPECT_EQ(beyond, 0);
 }
 
 /// A cylinder's matches turn with the light: untold, its roll is wrong by far more than is said; told, it
 /// is held to be unobserved.
-TEST(Honesty, FeaturesKnowWhatTheLightMoves) {
-    HonestyOptions o;
+TEST(Consistency, FeaturesKnowWhatTheLightMoves) {
+    ConsistencyOptions o;
     o.methods = {"features"}, o.conditions = {"plain"};
     o.size = 240, o.trials = 1;
     o.world.light_rad = 2 * kDegree;
     constexpr int kTrial = 415;
-    const HonestyRow untold = run(o, kTrial).front();
+    const ConsistencyRow untold = run(o, kTrial).front();
     EXPECT_EQ(untold.beyond, 1) << untold.target;
     o.told = o.world;
-    const HonestyRow told = run(o, kTrial).front();
+    const ConsistencyRow told = run(o, kTrial).front();
     EXPECT_EQ(told.beyond, 0) << told.target;
     EXPECT_EQ(told.answers[static_cast<std::size_t>(AnswerKind::refused)], 0) << "it is answered";
 }
 
 /// The third start is held against the answer where the second has left the view of another window, without a
 /// Jacobian (it crashed).
-TEST(Honesty, DenseThirdStartAfterAWholeSecondDescent) {
-    HonestyOptions o;
+TEST(Consistency, DenseThirdStartAfterAWholeSecondDescent) {
+    ConsistencyOptions o;
     o.methods = {"dense"};
     o.trials = 1;
     const auto rows = run(o, 142147);
@@ -86,8 +86,8 @@ TEST(Honesty, DenseThirdStartAfterAWholeSecondDescent) {
 }
 
 /// What the second start leaves is not the noise of fewer samples than the answer's.
-TEST(Honesty, ASecondStartThatAgreesAddsLittleToDenseCovariances) {
-    const auto scene = honesty_scene("craft", 96);
+TEST(Consistency, ASecondStartThatAgreesAddsLittleToDenseCovariances) {
+    const auto scene = consistency_scene("craft", 96);
     ASSERT_TRUE(scene) << scene.error().text();
     const auto render_scene = RenderScene::create(*scene);
     ASSERT_TRUE(render_scene);
@@ -123,43 +123,43 @@ TEST(Honesty, ASecondStartThatAgreesAddsLittleToDenseCovariances) {
 
 /// Matches of outlines, of shading and along edges, which end where the start left them; from 30000 on too few of
 /// them; the last with a weak motion that is no turn across the line of sight.
-TEST(Honesty, FeatureTrialsThatLied) {
-    HonestyOptions o;
+TEST(Consistency, FeatureTrialsThatLied) {
+    ConsistencyOptions o;
     o.methods = {"features"};
     o.trials = 1;
     o.size = 240;
     for (const int trial : {20467, 20191, 20769, 21232, 20275, 20277, 20292, 20829, 21163, 20132,
                             20757, 21300, 20691, 21083, 30272, 30583, 31595, 40416, 41019, 63168})
-        for (const HonestyRow& row : run(o, trial))
+        for (const ConsistencyRow& row : run(o, trial))
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
 
 /// Sweeps in which one or two points held a motion, lay on the wrong face, or were explained by a symmetry far from
 /// the start; the last with a false minimum that is only left by way of another.
-TEST(Honesty, LidarTrialsThatLied) {
-    HonestyOptions o;
+TEST(Consistency, LidarTrialsThatLied) {
+    ConsistencyOptions o;
     o.methods = {"icp"};
     o.trials = 1;
     for (const int trial :
          {12962, 18467, 15863, 16627, 18451, 11711, 16469, 19868, 13506, 12260, 15364, 18501, 16350, 22109})
-        for (const HonestyRow& row : run(o, trial))
+        for (const ConsistencyRow& row : run(o, trial))
             EXPECT_EQ(row.beyond, 0) << trial << ": " << row.target << ", " << row.condition;
 }
 
 /// A false minimum of a prism, well held, whose points are further from the model than noise explains.
-TEST(Honesty, LidarTrialOfAnotherSizeThatLied) {
-    HonestyOptions o;
+TEST(Consistency, LidarTrialOfAnotherSizeThatLied) {
+    ConsistencyOptions o;
     o.methods = {"icp"};
     o.conditions = {"plain"};
     o.world.scale = o.told.scale = 0.01;
     o.trials = 1;
-    for (const HonestyRow& row : run(o, 200024)) EXPECT_EQ(row.beyond, 0) << row.target;
+    for (const ConsistencyRow& row : run(o, 200024)) EXPECT_EQ(row.beyond, 0) << row.target;
 }
 
 /// A craft is taken for the same one with details, whose pose it has: beams without return pass through the
 /// details.
-TEST(Honesty, LidarTellsACraftFromOneWithDetails) {
-    HonestyOptions o;
+TEST(Consistency, LidarTellsACraftFromOneWithDetails) {
+    ConsistencyOptions o;
     o.methods = {"icp"};
     o.trials = 1;
     const auto rows = run(o, 28449);
@@ -168,15 +168,15 @@ TEST(Honesty, LidarTellsACraftFromOneWithDetails) {
     EXPECT_EQ(rows.front().answers[static_cast<std::size_t>(AnswerKind::refused)], 1);
 }
 
-TEST(Honesty, FewTrialsOfEach) {
-    HonestyOptions o;
+TEST(Consistency, FewTrialsOfEach) {
+    ConsistencyOptions o;
     o.conditions = {"plain", "dark", "beside", "far", "wrong"};
     for (const auto& [method, trials] :
          {std::pair{"points", 500}, {"icp", 200}, {"icp-search", 12}, {"features", 8}, {"dense", 8}}) {
         o.methods = {method};
         o.trials = trials;
         int good = 0;
-        for (const HonestyRow& row : run(o, 0)) {
+        for (const ConsistencyRow& row : run(o, 0)) {
             EXPECT_EQ(row.beyond, 0) << method << ", " << row.target << ", " << row.condition;
             good += row.answers[0];
         }
@@ -184,8 +184,8 @@ TEST(Honesty, FewTrialsOfEach) {
     }
 }
 
-TEST(Honesty, ATargetFromASceneFile) {
-    HonestyOptions o;
+TEST(Consistency, ATargetFromASceneFile) {
+    ConsistencyOptions o;
     o.methods = {"icp"};
     o.conditions = {"plain"};
     o.targets = {NARPA_BUILD_DIR "/scenes/docking/docking.toml"};
@@ -197,48 +197,48 @@ TEST(Honesty, ATargetFromASceneFile) {
     EXPECT_EQ(rows.front().beyond, 0);
 }
 
-TEST(Honesty, ATargetThatIsNone) {
+TEST(Consistency, ATargetThatIsNone) {
     static TracingThreads threads(0);
     const StopFlag stop{};
-    HonestyOptions o;
+    ConsistencyOptions o;
     for (const auto& [name, what] :
          {std::pair{"teapot", "expected one of the names"}, {"teapot.toml", "no such file"}}) {
         o.targets = {name};
-        const auto rows = run_honesty(
+        const auto rows = run_consistency(
             o, 0, threads, [](const std::string&) {}, stop);
         ASSERT_FALSE(rows);
         EXPECT_NE(rows.error().what.find(what), std::string::npos) << rows.error().what;
     }
 }
 
-TEST(Honesty, AWrongTargetNeedsAnother) {
+TEST(Consistency, AWrongTargetNeedsAnother) {
     static TracingThreads threads(0);
     const StopFlag stop{};
-    HonestyOptions o;
+    ConsistencyOptions o;
     o.methods = {"icp"};
     o.targets = {"craft"};
     o.trials = 40;
-    for (const HonestyRow& row : run(o, 0)) EXPECT_NE(row.condition, "wrong");
+    for (const ConsistencyRow& row : run(o, 0)) EXPECT_NE(row.condition, "wrong");
     o.conditions = {"wrong"};
-    const auto rows = run_honesty(
+    const auto rows = run_consistency(
         o, 0, threads, [](const std::string&) {}, stop);
     ASSERT_FALSE(rows);
     EXPECT_NE(rows.error().what.find("at least two targets"), std::string::npos) << rows.error().what;
 }
 
 /// A model that is wrong and told so: the answers are as far off, and say it.
-TEST(Honesty, ToldErrorsOfTheModelAreInTheCovariance) {
-    HonestyOptions o;
+TEST(Consistency, ToldErrorsOfTheModelAreInTheCovariance) {
+    ConsistencyOptions o;
     o.methods = {"points"};
     o.conditions = {"plain"};
     o.trials = 400;
     o.world = {.scale = 0.01, .mesh_m = 0.003, .boresight_rad = 1e-3};
     int lies = 0, good = 0;
-    for (const HonestyRow& row : run(o, 0)) lies += row.beyond, good += row.answers[0];
+    for (const ConsistencyRow& row : run(o, 0)) lies += row.beyond, good += row.answers[0];
     EXPECT_GT(lies, 0.3 * good) << "untold";
     o.told = o.world;
     lies = 0;
-    for (const HonestyRow& row : run(o, 0)) lies += row.beyond;
+    for (const ConsistencyRow& row : run(o, 0)) lies += row.beyond;
     EXPECT_EQ(lies, 0);
 }
 

@@ -78,7 +78,7 @@ Replayed render_again(const ReplayOptions& o, Replay& run) {
 }
 
 /// "nav.ledger.csv:12: frame 10: rays: 512, logged 513" for each, up to kDifferencesShown.
-std::string differences_in_words(const Replayed& done, const std::string& log) {
+std::string differences_text(const Replayed& done, const std::string& log) {
     std::string out;
     std::size_t shown = 0, differing = 0;
     for (const auto* frames : {&done.frames, &done.forged})
@@ -130,7 +130,7 @@ Outcome replay_camera(const ReplayOptions& o) {
     say(fmt::format("{}: camera {}: {} of {} frames repeat bit for bit; {} in the log{}", o.folder, camera,
                     repeated, done.frames.size(), (*run)->frames().size(),
                     done.not_whole > 0 ? fmt::format("; {} had no whole image", done.not_whole) : ""));
-    if (!passed) say(differences_in_words(done, log));
+    if (!passed) say(differences_text(done, log));
 
     nlohmann::json frames = nlohmann::json::array();
     for (const ReplayedFrame& f : done.forged) frames.push_back(to_json(f, (*run)->world().scene()));

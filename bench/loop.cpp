@@ -53,7 +53,7 @@ std::string ms(const H& h) {
 }
 
 /// Times of the stages, samples per pixel, refinement steps and expected error.
-std::string frames_in_words(const CameraStats& s) {
+std::string frames_text(const CameraStats& s) {
     std::string steps;
     for (std::size_t i = 0; i < kStepNames.size(); ++i)
         if (s.steps[i] > 0) steps += fmt::format("{}{} {}", steps.empty() ? "" : ", ", s.steps[i], kStepNames[i]);
@@ -160,8 +160,8 @@ std::string to_text(const std::vector<LoopRun>& runs) {
                 fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24} {:>26} {:>7.1f}%\n", run.name,
                             c.name, s.frames, s.deadline_missed, s.skipped, c.incomplete(), ms(s.wake_late),
                             ms(s.render), ms(s.hand_over), ms(s.late), 100 * c.allowance_used(0.5));
-            out += fmt::format("{:>7} {:>8} {}\n", "", "", frames_in_words(s));
-            out += fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_in_words(s.late));
+            out += fmt::format("{:>7} {:>8} {}\n", "", "", frames_text(s));
+            out += fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_text(s.late));
         }
         for (const LidarRun& l : run.lidars)
             out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24}\n", run.name, l.name,

@@ -180,7 +180,7 @@ std::string dropped(const Counts& causes) {
     return fmt::format("{} dropped{}", all, all > 0 ? " (" + non_zero(causes) + ")" : "");
 }
 
-std::string bus_in_words(const CanNode& node) {
+std::string bus_text(const CanNode& node) {
     const CommandCounters c = node.counters();
     const CanCounters& b = node.bus().counters();
     return fmt::format("  can {}: {} commands taken, {} missed, rejected: {}\n", node.bus().description(), c.taken,
@@ -218,7 +218,7 @@ std::string against_deadline(double late_ms) {
     return fmt::format("{:.2f} ms {}", std::abs(late_ms), late_ms > 0 ? "after" : "before");
 }
 
-std::string lateness_in_words(const SignedHistogram& late) {
+std::string lateness_text(const SignedHistogram& late) {
     std::string text;
     for (const auto& [from, to, frames] : lateness_bins(late)) {
         if (frames == 0) continue;
@@ -248,8 +248,7 @@ std::string CameraSensor::to_text(bool lockstep) const {
             "\n    hand-over, from the deadline: p50 {}, p90 {}, p99 {}, p99.9 {}, latest {}; repeated {}, blank "
             "{}\n"
             "    frames: {}",
-            late(0.5), late(0.9), late(0.99), late(0.999), late(1), s.repeated, s.blanked,
-            lateness_in_words(s.late));
+            late(0.5), late(0.9), late(0.99), late(0.999), late(1), s.repeated, s.blanked, lateness_text(s.late));
     }
     out += "\n";
     out +=
@@ -278,7 +277,9 @@ std::string LidarSensor::to_text(bool lockstep) const {
     std::string out = fmt::format("  lidar {}: {} packets = {:.2f} sweeps, {} skipped, {} returns of {} shots\n",
                                   name(), s.packets, sweeps(), s.skipped, s.returns, s.shots);
     out += fmt::format("    p50 / p99 / max: fire {}", latency(s.fire));
-    if (!lockstep) out += fmt::format("; due to sent {}", latency(s.hand_over));
+    if (!lockstep)
+        out +=
+            fmt::format("; due to sent {}; {} late by more than a packet's period", latency(s.hand_over), s.late);
     out += "\n";
     for (const auto& sink : sinks_) {
         const PacketCounters c = sink->counters();
@@ -387,7 +388,7 @@ std::string to_text(const Emulator& emulator) {
     if (const OnlineEstimator* e = emulator.estimator())
         out += fmt::format("  estimate of {} from camera {}: {} frames skipped; {}", e->target(), e->camera().name,
                            e->skipped(), to_text(summarise(e->frames())));
-    if (emulator.can()) out += bus_in_words(*emulator.can());
+    if (emulator.can()) out += bus_text(*emulator.can());
     if (!lockstep)
         out += fmt::format("  page faults while running: {} minor, {} major\n", emulator.page_faults().minor,
                            emulator.page_faults().major);

@@ -41,7 +41,7 @@ struct LatenessBin {
 /// "1.69 ms before", "0.30 ms after".
 [[nodiscard]] std::string against_deadline(double late_ms);
 /// "598 1 to 3 ms early, 2 0.3 to 1 ms late": the bins that are not empty.
-[[nodiscard]] std::string lateness_in_words(const SignedHistogram& late);
+[[nodiscard]] std::string lateness_text(const SignedHistogram& late);
 
 /// Note beside a number of samples per pixel: how it is counted.
 inline constexpr const char* kSamplesPerPixelNote = "mean of all pixels; tiles without a body take none";

@@ -52,7 +52,8 @@ constexpr std::int64_t kAnswerTimeout_ns = 5 * kSecond_ns;  // the hub may be bu
 Status greet(int fd) {
     const auto failed = [] {
         const bool hung_up = errno == 0 || errno == EPIPE || errno == ECONNRESET;
-        return Error{hung_up ? "connection closed: the hub has reached its limit of clients" : std::strerror(errno)};
+        return Error{hung_up ? "connection closed: the hub has reached its limit of clients"
+                             : std::strerror(errno)};
     };
     for (const std::string_view line : kGreeting)
         if (::send(fd, line.data(), line.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(line.size()))

@@ -345,7 +345,7 @@ Result<nlohmann::json> run_dynamics(const Scenario& scenario, const DynamicsOpti
 
 namespace {
 
-std::string ending_in_words(const std::string& ending) {
+std::string ending_text(const std::string& ending) {
     constexpr std::array<std::string_view, kEndings.size()> kWords{"not over",
                                                                    "docked",
                                                                    "bounced off",
@@ -367,7 +367,7 @@ std::string to_text(const nlohmann::json& d) {
         "CAN "
         "frames dropped",
         d["scenario"].get<std::string>(), d["seed"].dump(), d["end_s"].get<double>(),
-        d["stopped"].get<bool>() ? "stopped" : ending_in_words(d["ending"].get<std::string>()),
+        d["stopped"].get<bool>() ? "stopped" : ending_text(d["ending"].get<std::string>()),
         commands["applied"].dump(), commands["lost"].dump(), commands["late"].dump(), commands["refused"].dump(),
         commands["bad_frames"].dump(), bus["frames_dropped"].dump());
 }

@@ -27,10 +27,14 @@ double miss(const RefractiveShells& shells, double apparent, double true_zenith,
 
 template <class Excess>
 double solve_zenith(const Excess& excess, double start) {
-    // Bracket: refraction lifts objects by less than 0.02 rad.
+    // Bracket: air as on Earth lifts objects by less than 0.02 rad. Denser air needs a wider one.
     double low = std::max(0.0, start - 0.02), high = std::min(0.5 * std::numbers::pi, start);
     if (excess(high) <= 0) return high;
     double at_low = excess(low);
+    while (at_low >= 0 && low > 0) {
+        low = std::max(0.0, 2 * low - start);
+        at_low = excess(low);
+    }
     if (at_low >= 0) return low;
     for (int step = 0; step < 100 && high - low > 1e-13; ++step) {
         // Secant; every third step bisects.

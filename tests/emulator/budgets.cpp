@@ -204,13 +204,13 @@ TEST(Report, CountsFramesByLateness) {
     for (int i = 0; i < 2; ++i) late.add(500'000);
     late.add(-45'000'000);
     const nlohmann::json told = lateness(late);
-    EXPECT_EQ(lateness_in_words(late), "1 over 30 ms early, 7 1 to 3 ms early, 2 0.3 to 1 ms late");
+    EXPECT_EQ(lateness_text(late), "1 over 30 ms early, 7 1 to 3 ms early, 2 0.3 to 1 ms late");
     std::uint64_t frames = 0;
     for (const nlohmann::json& bin : told["bins"]) frames += bin["frames"].get<std::uint64_t>();
     EXPECT_EQ(frames, late.count());
     EXPECT_NEAR(told["p50"].get<double>(), -2, 0.07);
     EXPECT_EQ(told["max"], 0.5);
-    EXPECT_EQ(lateness_in_words({}), "none");
+    EXPECT_EQ(lateness_text({}), "none");
     EXPECT_EQ(against_deadline(-1.69), "1.69 ms before");
     EXPECT_EQ(against_deadline(0.3), "0.30 ms after");
 }

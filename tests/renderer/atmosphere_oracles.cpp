@@ -108,6 +108,13 @@ TEST(Refraction, ConservesBouguersInvariantAndIsInverted) {
     }
 }
 
+TEST(Refraction, DenseAirLiftsObjectsByMoreThanADegree) {
+    const auto shells = shells_of(LapseAtmosphere(1e-3, 283.15), 6371000, 0, 80000, 50);
+    const double refraction = bend(shells, 1.55).refraction_rad;
+    EXPECT_GT(refraction, 0.02);
+    EXPECT_NEAR(apparent_zenith(shells, 1.55 + refraction), 1.55, 1e-11);
+}
+
 TEST(AirColumns, OfTheMarchAreChapmans) {
     const AirDescription description = earth_air();
     const Air air(description, 550e-9);

@@ -4,7 +4,7 @@
 Usage: dynamics.py BUS [SECONDS]      BUS: as `narpa run --can`: slcan:29537, vcan0, udp:239.74.163.2
 
 At the start of each control period it reports the attitude that a star tracker would measure, commands the poses of all
-bodies, and waits for the navigation's actuator command. Within the period it commands poses alone.
+bodies, and waits for the navigation's actuator command. Within the period it only commands poses.
 """
 import sys
 import time
@@ -18,7 +18,7 @@ from narpa.can import Bus
 
 PERIOD_S, POSES_PER_PERIOD = 1.0, 5
 STEP_S = PERIOD_S / POSES_PER_PERIOD
-PATIENCE_S = 60  # wall time until a command must have come
+PATIENCE_S = 60  # timeout for a command, wall time
 CHASER, TARGET, EARTH = 0x100, 0x110, 0x120  # each body's can_id in scene.toml
 AT_REST = {TARGET: (12.0, 0.0, 0.0), EARTH: (0.0, 0.0, -6778137.0)}  # m, world axes
 
@@ -35,7 +35,7 @@ class Chaser:
         self.rate = np.array([0.0003, -0.0002, 0.0002])
 
     def push(self, impulse, angular_impulse):
-        """Both in body axes, N s and N m s."""
+        """Applies an impulse (N s) and an angular impulse (N m s), both in body axes."""
         self.velocity = self.velocity + rotation.rotate(self.attitude, impulse) / self.MASS_KG
         self.rate = self.rate + np.array(angular_impulse) / self.INERTIA_KG_M2
 
@@ -50,7 +50,7 @@ def report(bus, t_ns, chaser, phase):
 
 
 def command_poses(bus, t_ns, chaser):
-    """The chaser's last: it completes the poses of this time."""
+    """Commands the chaser's pose last: it completes the set of poses of this time."""
     for can_id, position in AT_REST.items():
         bus.send_pose(can_id, t_ns, position, attitude=(1, 0, 0, 0))
     bus.send_pose(CHASER, t_ns, chaser.position, chaser.attitude, chaser.velocity, chaser.rate)

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Stands in for `narpa run` in lockstep: hands over a frame whenever one is due. The frames are black: draw yours instead.
+"""Replaces `narpa run` in lockstep: hands over a frame whenever one is due. The frames are black: draw your own instead.
 
 Usage: emulator.py BUS FIFO      BUS: udp:239.74.163.2, or vcan0 with CAN FD
 
-When the chaser's pose for time t has come (it is the last of all bodies'), every frame due by t is written to the FIFO,
-its ledger is sent, and then the heartbeat reports that the emulator has reached t.
+When the chaser's pose for time t arrives (the poses of the other bodies arrive before it), the ledger of every frame due
+by t is sent and the frame is written to the FIFO. Then the heartbeat reports that the emulator has reached t.
 """
 import sys
 from pathlib import Path
@@ -17,7 +17,7 @@ from narpa.can import Bus
 
 WIDTH, HEIGHT, RATE_HZ = 320, 240, 1
 PERIOD_NS = 1_000_000_000 // RATE_HZ
-CHASER = 0x100  # its can_id in scene.toml
+CHASER = 0x100  # can_id of the chaser in scene.toml
 
 
 def draw(t_ns):
@@ -26,7 +26,7 @@ def draw(t_ns):
 
 
 def send_ledger(bus, frame, t_ns):
-    """Exposed at t_ns in no time, by one sample a pixel, handed over a microsecond later. Times in us after t_ns."""
+    """Ledger of a frame with zero exposure time at t_ns, one sample per pixel, and hand-over 1 us later. Times are us after t_ns."""
     bus.send("Ledger", Frame=frame, Camera=0, PoseCounter=frame % 256, ExposureMid=t_ns, PoseTime=t_ns,
              ExposureStart=0, ExposureEnd=0, RenderStart=0, RenderEnd=0, HandOver=1, Deadline=PERIOD_NS // 1000,
              SamplesPerPixel=1, ExpectedError=0, Samples=WIDTH * HEIGHT, Rays=0, Step="refined", Passes=0, PoseStale=0,
@@ -39,7 +39,7 @@ def main(bus_name, fifo):
         print("ready", flush=True)
         for message in bus:
             if message.name == "Dynamics" and message["Phase"] == "finished":
-                finished = True  # its poses for this time are still to come
+                finished = True  # the poses for this time are still to arrive
             if message.name != "Pose" or message.base != CHASER:
                 continue
             t_ns = message["Time"]

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Holds station beside what the camera sees, without a model of it.
+"""Holds station relative to the target that the camera sees, without a model of the target.
 
 Usage: navigation.py BUS VIDEO [RATE]      BUS: as `narpa run --can`; VIDEO: a FIFO or /dev/videoN
                                            RATE: of the target about its y axis, rad/s (default: that of the orbit)
 
-The corners of the first frame are followed through all others: their shift and scale give how far the chaser has drifted.
-The star tracker's report on CAN gives how it is turned. Once each control period a PD controller commands impulses.
+Corners of the first frame are tracked through all later frames. Their shift and scale give the drift of the chaser. The
+attitude comes from the star tracker's report on CAN. Once each control period a PD controller commands impulses.
 """
 import sys
 from pathlib import Path
@@ -19,14 +19,14 @@ from narpa.can import Bus
 
 PERIOD_S, MASS_KG, INERTIA_KG_M2 = 1.0, 9500.0, np.array([22000.0, 31000.0, 31000.0])  # scenes/rehearsal/docking.toml
 WIDTH, HEIGHT, FOCAL_PX = 320, 240, 386.3
-RANGE_M = 28.0  # to what the camera sees, about
+RANGE_M = 28.0  # approximate distance to the target
 R_CHASER_CAMERA = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 ORBIT_RATE_RAD_S = 1.1313e-3
-MOST = 300.0  # N s and N m s that the thrusters deliver in a period
+MOST = 300.0  # largest impulse (N s) and angular impulse (N m s) of the thrusters in a period
 
 
 def frames_of(video):
-    """Grey frames, one after another; the stream begins with the first one."""
+    """Yields grey frames, beginning with the first one of the stream."""
     if not video.startswith("/dev/"):
         yield from y4m.Reader(video)
     device = cv2.VideoCapture(video, cv2.CAP_V4L2)
@@ -36,11 +36,11 @@ def frames_of(video):
 
 
 class CornerTracker:
-    """Where the target is in the camera's axes, from the shift and scale of the first frame's corners."""
+    """Estimates the target's position in camera axes from the shift and scale of the first frame's corners."""
 
     def __init__(self, first):
         self.first, self.corners = first, cv2.goodFeaturesToTrack(first, maxCorners=200, qualityLevel=0.02, minDistance=6)
-        self.fit = np.eye(2, 3)  # first frame to newest frame
+        self.fit = np.eye(2, 3)  # similarity transform from the first to the latest frame
         self.matched = 0
 
     def target(self, frame):
@@ -56,14 +56,14 @@ class CornerTracker:
 
 
 class StationKeeper:
-    """Filters the drift, and computes the impulses that undo it. The wanted attitude turns with the target."""
+    """Filters the drift and computes the impulses that correct it. The desired attitude rotates with the target."""
 
     def __init__(self, attitude, t_ns, target_rate):
         self.first_attitude, self.first_ns, self.target_rate = attitude, t_ns, np.array([0.0, target_rate, 0.0])
-        self.drift, self.drift_rate = np.zeros(3), np.zeros(3)  # of the target, m and m/s, wanted axes
+        self.drift, self.drift_rate = np.zeros(3), np.zeros(3)  # of the target: m and m/s, axes of the desired attitude
 
     def command(self, t_ns, attitude, rate, target_camera):
-        """Impulse and angular impulse in body axes, and the angle off the wanted attitude, rad."""
+        """Impulse and angular impulse in body axes, and the attitude error, rad."""
         turned = rotation.from_vector(self.target_rate * (t_ns - self.first_ns) * 1e-9)
         wanted = rotation.product(turned, self.first_attitude)
         off = rotation.product(rotation.conjugate(wanted), attitude)
@@ -95,7 +95,7 @@ def main(bus_name, video, target_rate=ORBIT_RATE_RAD_S):
             if message.name == "Dynamics" and message["Phase"] == "finished":
                 break
             if message.name == "Attitude":
-                report = message  # a command is due for its time
+                report = message  # the actuator command for its time is due
             if message.name == "Ledger" and message["Delivery"] != "nothing":
                 frame = next(frames)
                 if tracker is None and report and message["ExposureMid"] >= report["Time"]:

@@ -1,7 +1,7 @@
-"""Frames as `narpa run --video CAMERA=bulk:` sends them to a USB frame bridge: what an FPGA or FX3 has to understand.
+"""Frames as `narpa run --video CAMERA=bulk:` sends them to a USB frame bridge, for example an FPGA or FX3.
 
-protocols/video/README.md has the table. Rows have no padding. A bridge that hands its host what it got, or a capture of
-it, is read with `read`; a frame that is cut short or spoilt is passed over.
+The format is defined in protocols/video/README.md. Rows have no padding. `read` reads a stream that a bridge forwards to
+its host, or a recording of it. Truncated and corrupted frames are skipped.
 """
 import struct
 import zlib
@@ -18,16 +18,16 @@ FORMATS = {"GREY": (1, np.uint8), "Y16 ": (1, "<u2"), "YUYV": (2, np.uint8), "RG
 class Header(NamedTuple):
     t_ns: int  # mid-exposure, simulation clock
     number: int
-    format: str  # V4L2's code
+    format: str  # V4L2 fourcc
     width: int
     height: int
     row_bytes: int
-    size: int  # bytes behind the header
-    crc: int  # CRC-32 of them
+    size: int  # bytes after the header
+    crc: int  # CRC-32 of these bytes
 
 
 def decode(data):
-    """The header in the first 48 bytes, or None where there is none."""
+    """Decodes the header in the first 48 bytes; None if they are not a valid header."""
     if len(data) < HEADER_BYTES or data[:4] != MAGIC:
         return None
     version, length, t_ns, number, fourcc, *sizes, crc = struct.unpack_from("<HHqI4s5II", data, 4)
@@ -50,7 +50,7 @@ def encode(pixels, t_ns, number, fourcc):
 
 
 def read(file):
-    """Yields header and pixels (as `encode` takes them) of each whole frame of a stream of bytes."""
+    """Yields header and pixels (as `encode` takes them) of each complete frame of a byte stream."""
     held = b""
     while True:
         if len(held) < HEADER_BYTES:
@@ -58,13 +58,13 @@ def read(file):
             if len(held) < HEADER_BYTES:
                 return
         if (header := decode(held)) is None:
-            at = held.find(MAGIC, 1)  # not here: perhaps further on
+            at = held.find(MAGIC, 1)  # no valid header here: continue at the next magic number
             held = held[at:] if at > 0 else held[-(len(MAGIC) - 1) :]
             continue
         held += file.read(HEADER_BYTES + header.size - len(held))
         data = held[HEADER_BYTES : HEADER_BYTES + header.size]
         if len(data) < header.size or zlib.crc32(data) != header.crc:
-            held = held[1:]  # another may begin within
+            held = held[1:]  # the next frame may begin within the corrupted one
             continue
         channels, kind = FORMATS[header.format]
         shape = (header.height, header.width) + ((channels,) if channels > 1 else ())

@@ -26,33 +26,33 @@ def crc(data, bits, polynomial, start, final):
 
 
 def crc8(data):
-    """CRC-8/SAE-J1850: of classic frames."""
+    """CRC-8/SAE-J1850, the checksum of classic frames."""
     return crc(data, 8, 0x1D, 0xFF, 0xFF)
 
 
 def crc16(data):
-    """CRC-16/IBM-3740: of CAN FD frames."""
+    """CRC-16/IBM-3740, the checksum of CAN FD frames."""
     return crc(data, 16, 0x1021, 0xFFFF, 0)
 
 
 def checksum(identifier, data):
-    """The last byte or bytes of a frame, over its identifier and what comes before them."""
+    """The checksum at the end of a frame. It covers the identifier and all preceding bytes."""
     covered = identifier.to_bytes(2, "little") + data
     return bytes([crc8(covered)]) if len(data) < 8 else crc16(covered).to_bytes(2, "little")
 
 
 def frame_data(identifier, data):
-    """The frame's bytes with the checksum that belongs to them."""
+    """The frame's bytes with their checksum at the end."""
     end = len(data) - (1 if len(data) == 8 else 2)
     return data[:end] + checksum(identifier, data[:end])
 
 
 @dataclass(frozen=True)
 class Received:
-    """A whole set: values by the names of the signals."""
+    """A complete set: values by the names of the signals."""
 
     name: str
-    base: int  # identifier; of a pose the body's can_id
+    base: int  # base identifier; for a pose the body's can_id
     counter: int
     values: dict
 
@@ -75,8 +75,8 @@ class SignalSet:
         self.name, self.base, self.classic, self.fd = name, base, classic, fd  # {offset: Message}; Message or None
 
     def encode(self, values, counter, fd=False):
-        """[(identifier, bytes)]. `values` may give a vector by the name that its signals share: Position=(x, y, z).
-        Signals that are not given are 0; in a CameraCommand "not available", which leaves the setting as it is."""
+        """Returns [(identifier, bytes)]. `values` may give a vector by the common name of its signals: Position=(x, y, z).
+        Missing signals are 0; in a CameraCommand they are "not available", which leaves the setting unchanged."""
         offsets = {self.fd.identifier % STEP: self.fd} if fd and self.fd else self.classic
         known = {name for message in offsets.values() for name in message.signals} - {"Counter", "Crc"}
         values = expanded(values, known)
@@ -104,7 +104,7 @@ def expanded(values, known):
 
 
 class Catalogue:
-    """The sets of a DBC file, also at the identifiers of other bodies and cameras."""
+    """The sets of a DBC file, also at the identifiers of bodies and cameras that it does not contain."""
 
     def __init__(self, path=None):
         self.sets, self.owners = {}, {}  # owners: {identifier: (set, message)}
@@ -114,19 +114,19 @@ class Catalogue:
             fd = group.pop(15, None)
             if fd:
                 self.sets.setdefault(fd.name.split("_")[-1], SignalSet(fd.name.split("_")[-1], base, group, fd))
-            else:  # single frames, which have no form for CAN FD
+            else:  # sets of a single classic frame, without a CAN FD variant
                 for offset, message in group.items():
                     self.sets[message.name] = SignalSet(message.name, base + offset, {0: message}, None)
 
     def at(self, name, base=None):
-        """The set of this name; a pose or ledger at its own base identifier."""
+        """The set of this name. `base`: identifier of another body's pose or another camera's ledger."""
         if name not in self.sets:
             raise ValueError(f"no set {name!r} in the DBC file, expected one of {', '.join(self.sets)}")
         known = self.sets[name]
         return known if base is None else SignalSet(name, base, known.classic, known.fd)
 
     def of(self, identifier):
-        """The set that a frame belongs to, and its message; (None, None) for a frame that is not narpa's."""
+        """The set that a frame belongs to, and its message; (None, None) for a foreign frame."""
         if identifier not in self.owners:
             self.owners[identifier] = self.owner(identifier)
         return self.owners[identifier]
@@ -145,7 +145,7 @@ class Catalogue:
 
 
 class Decoder:
-    """Gathers frames until a set is whole."""
+    """Collects frames until a set is complete."""
 
     def __init__(self, catalogue):
         self.catalogue, self.gathered = catalogue, {}  # {base: (counter, {identifier: values})}
@@ -172,13 +172,13 @@ class Decoder:
 
 
 class Bus:
-    """A CAN bus by narpa's own name for it:
+    """A CAN bus, named as in narpa's options:
 
     vcan0, can0          SocketCAN; with CAN FD frames where fd=True
     slcan:[HOST:]PORT    narpa run --can slcan:PORT; classic frames. Also python-can's socket://HOST:PORT
     udp:GROUP            narpa run --can udp:GROUP; CAN FD frames
 
-    Counters are kept here: every set that is sent has the next one.
+    The bus keeps one counter for each base identifier and increments it with each set that it sends.
     """
 
     def __init__(self, name, fd=False, catalogue=None, patience_s=0):
@@ -201,7 +201,7 @@ class Bus:
         self.send(POSE, can_id, Time=t_ns, Position=position, Attitude=attitude, Velocity=velocity, Rate=rate)
 
     def receive(self, timeout_s=None):
-        """The next whole set, or None after so many seconds without one."""
+        """The next complete set, or None if there is none within timeout_s."""
         until = None if timeout_s is None else time.monotonic() + timeout_s
         while until is None or time.monotonic() < until:
             frame = self.bus.recv(None if until is None else max(0, until - time.monotonic()))
@@ -211,7 +211,7 @@ class Bus:
         return None
 
     def __iter__(self):
-        """Messages until the bus is gone: `narpa run` has ended."""
+        """Yields messages until the bus is closed because `narpa run` has ended."""
         import can
 
         while True:
@@ -232,7 +232,7 @@ class Bus:
 
 
 def open_python_can(name, fd, patience_s=0):
-    """A python-can bus by narpa's name for it; tries again for so many seconds if the bus does not exist yet."""
+    """Opens a bus with python-can; retries for patience_s seconds if the bus does not exist yet."""
     import can
 
     if name.startswith(("slcan:", "socket://")):
@@ -248,7 +248,7 @@ def open_python_can(name, fd, patience_s=0):
     while True:
         try:
             return can.Bus(**settings)
-        except Exception:  # which one depends on the interface
+        except Exception:  # the type of the exception depends on the interface
             if time.monotonic() > until:
                 raise
             time.sleep(0.1)

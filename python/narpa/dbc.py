@@ -11,7 +11,7 @@ HERE = Path(__file__).resolve().parent
 
 
 def shipped_dbc():
-    """The DBC file that belongs to narpa: one body "chaser" at 0x100, camera 0, and the messages of a closed loop."""
+    """The DBC file that comes with narpa: one body "chaser" at 0x100, camera 0, and the messages of a closed loop."""
     return HERE.parents[1] / "protocols/can/narpa.dbc"  # in the repository and in PREFIX/share/narpa
 
 
@@ -23,10 +23,10 @@ class Signal:
     signed: bool
     factor: float
     unit: str
-    choices: dict = field(default_factory=dict, compare=False)  # {raw value: word}
+    choices: dict = field(default_factory=dict, compare=False)  # {raw value: name}
 
     def encode(self, value):
-        """The raw value in two's complement. Words stand for their numbers; clocks are modulo their length."""
+        """The raw value in two's complement. Names of enumerated values are accepted; clocks (ns, us) wrap around."""
         if isinstance(value, str):
             numbers = [number for number, word in self.choices.items() if word == value]
             if not numbers:
@@ -43,7 +43,7 @@ class Signal:
         return raw % (1 << self.length)
 
     def decode(self, payload):
-        """From the payload as one integer: the value in the signal's unit, its word, or None."""
+        """Decodes the signal from the payload as one integer: a value in the signal's unit, an enumerated name, or None."""
         raw = payload >> self.start & (1 << self.length) - 1
         if self.signed and raw >> self.length - 1:
             raw -= 1 << self.length
@@ -60,7 +60,7 @@ class Message:
     signals: dict = field(default_factory=dict)  # {name: Signal}
 
     def encode(self, values):
-        """Bytes with these signals; the others are 0."""
+        """The payload with these signals; all others are 0."""
         payload = 0
         for name, value in values.items():
             payload |= self.signals[name].encode(value) << self.signals[name].start
@@ -75,7 +75,7 @@ SIGNAL = re.compile(r'SG_ (\w+) : (\d+)\|(\d+)@(\d)([+-]) \(([^,]+),([^)]+)\) \[
 
 
 def read(path=None):
-    """{identifier: Message} of a DBC file, by default of the one that belongs to narpa."""
+    """{identifier: Message} of a DBC file, by default of the one that comes with narpa."""
     path = Path(path or shipped_dbc())
     messages, message = {}, None
     for number, line in enumerate(path.read_text().splitlines(), 1):

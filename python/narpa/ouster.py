@@ -1,7 +1,7 @@
-"""Lidar packets of Ouster's sensors (Firmware User Manual, "Lidar Data Packet Format"), as narpa sends and records them.
+"""Lidar packets of Ouster sensors (Firmware User Manual, "Lidar Data Packet Format"), as narpa sends and records them.
 
-A sensor's metadata JSON states its beams and the format of its packets. A packet has 16 columns; the shots of a column are at
-one instant. Positions are in the maker's sensor frame: x forward, y left, z up. (narpa's LiDAR frame: x right, y forward, z up.)
+A sensor's metadata JSON states its beams and the format of its packets. A packet has 16 columns; all shots of a column have
+the same time. Positions are in Ouster's sensor frame: x forward, y left, z up. (narpa's LiDAR frame: x right, y forward, z up.)
 """
 import json
 import struct
@@ -12,8 +12,8 @@ import numpy as np
 from narpa.pcap import udp_payloads
 
 PORT, COLUMNS = 7502, 16
-# profile: bytes of packet header, column header, pixel, column footer, packet footer; fields of a pixel as (first bit, bits,
-# power of two of the unit). Ranges are in mm; the fields of the second return end in 2.
+# For each profile: sizes in bytes of packet header, column header, pixel, column footer, packet footer; fields of a pixel as
+# (first bit, bits, binary exponent of the unit). Ranges are in mm. The fields of the second return end in 2.
 PROFILES = {
     "LEGACY": ((0, 16, 12, 4, 0), {"range": (0, 20, 0), "flags": (28, 4, 0), "reflectivity": (32, 8, 0), "signal": (48, 16, 0), "near_ir": (64, 16, 0)}),
     "RNG19_RFL8_SIG16_NIR16": (
@@ -32,7 +32,7 @@ POINT = np.dtype([("position_m", float, 3), ("range_m", float), ("reflectivity",
 
 
 class Packet:
-    """The numbers of a packet: `frame_id`, `init_id` and `serial` (0 in LEGACY); `t_ns`, `column` and `valid` of each column;
+    """The decoded fields of a packet: `frame_id`, `init_id` and `serial` (0 in LEGACY); `t_ns`, `column` and `valid` of each column;
     `fields`, arrays of columns x beams."""
 
     def __init__(self, data, profile, beams):
@@ -66,12 +66,12 @@ class Packet:
 
 
 class Sensor:
-    """A sensor as its metadata describe it: a dictionary, or the path of a JSON file."""
+    """A sensor, described by its metadata: a dictionary, or the path of a JSON file."""
 
     def __init__(self, metadata):
         document = metadata if isinstance(metadata, dict) else json.loads(Path(metadata).read_text())
         flat = dict(document)
-        for section in document.values():  # firmware 2.4 and later keeps the keys in sections
+        for section in document.values():  # since firmware 2.4 the keys are in sections
             if isinstance(section, dict):
                 flat.update(section)
         self.altitude, self.azimuth = (np.radians(flat[f"beam_{a}_angles"]) for a in ("altitude", "azimuth"))
@@ -84,11 +84,11 @@ class Sensor:
         self.init_id, self.serial = flat.get("initialization_id", 0), int(flat.get("prod_sn") or 0)
 
     def packet(self, data):
-        """The numbers of a packet."""
+        """Decodes the fields of a packet."""
         return Packet(data, self.profile, len(self.altitude))
 
     def positions(self, columns, range_mm):
-        """In the sensor frame, metres; `range_mm`: columns x beams, as a packet has it."""
+        """Positions in the sensor frame, metres. `range_mm` is an array of columns x beams, as in a packet."""
         encoder = 2 * np.pi * (1 - columns[:, None] / self.columns)
         azimuth, out = encoder - self.azimuth, 1e-3 * range_mm - self.n_m
         lidar = np.stack([out * np.cos(azimuth) * np.cos(self.altitude) + self.out_m * np.cos(encoder),
@@ -97,7 +97,7 @@ class Sensor:
         return lidar @ self.lidar_to_sensor[:3, :3].T + 1e-3 * self.lidar_to_sensor[:3, 3]
 
     def decode(self, data):
-        """The returns of a packet as an array of POINT, in firing order; of each shot the strongest first."""
+        """The returns of a packet as an array of POINT, in firing order; the strongest return of a shot comes first."""
         packet = self.packet(data)
         echoes = 2 if "range2" in packet.fields else 1
         points = np.zeros((COLUMNS, len(self.altitude), echoes), POINT)

@@ -5,7 +5,7 @@ ORDER = {b"\xd4\xc3\xb2\xa1": "<", b"\x4d\x3c\xb2\xa1": "<", b"\xa1\xb2\xc3\xd4"
 
 
 def udp_payloads(path):
-    """What the UDP datagrams of a capture carry, one after the other."""
+    """Yields the payloads of the UDP datagrams of a capture."""
     with open(path, "rb") as file:
         order = ORDER.get(file.read(4))
         if order is None:
@@ -18,7 +18,7 @@ def udp_payloads(path):
 
 
 def _udp_payload(frame):
-    """Of an Ethernet frame with IPv4; None for other frames."""
+    """The UDP payload of an Ethernet frame with IPv4; None for other frames."""
     if frame[12:14] != b"\x08\x00" or len(frame) < 42 or frame[23] != 17:
         return None
     start = 14 + 4 * (frame[14] & 15)

@@ -1,4 +1,4 @@
-"""Packets of LiDARs that a file describes (protocols/lidar/README.md, "Point packets"), as narpa sends and records them.
+"""Packets of LiDARs that are described by a file (protocols/lidar/README.md, "Point packets"), as narpa sends and records them.
 
 Frame: x right, y forward, z up; azimuth clockwise from +y seen from above.
 """
@@ -24,7 +24,7 @@ POINT = np.dtype([("position_m", float, 3), ("range_m", float), ("azimuth_rad", 
 
 
 def decode(packet):
-    """A Packet, whose `points` are its returns as an array of POINT; `shot` counts within the frame."""
+    """Decodes a Packet. `points` are its returns as an array of POINT; `shot` is the index of the shot in its frame."""
     if len(packet) < HEADER.size:
         raise ValueError(f"a packet of {len(packet)} bytes, expected {HEADER.size} or more")
     (magic, version, flags, count, frame, first, start_ns, shots, range_step_um, velocity_step_um_s,
@@ -53,5 +53,5 @@ def decode(packet):
 
 
 def read_pcap(path):
-    """The packets of a capture, each decoded."""
+    """Yields the decoded packets of a capture."""
     return (decode(payload) for payload in pcap.udp_payloads(path) if payload[:4] == MAGIC)

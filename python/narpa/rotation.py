@@ -1,16 +1,16 @@
-"""Rotations: unit quaternions (w, x, y, z), Hamilton's convention. One that turns body coordinates into world coordinates
-is the attitude of the body."""
+"""Rotations: unit quaternions (w, x, y, z), Hamilton's convention. An attitude rotates body coordinates into world
+coordinates."""
 import numpy as np
 
 
 def product(a, b):
-    """First b, then a."""
+    """The rotation by b, then by a."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     return np.append(a[0] * b[0] - a[1:] @ b[1:], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))
 
 
 def conjugate(q):
-    """The rotation back."""
+    """The inverse rotation."""
     return np.asarray(q, float) * [1, -1, -1, -1]
 
 
@@ -19,7 +19,7 @@ def rotate(q, vector):
 
 
 def from_vector(rotation_vector):
-    """By the angle |v| in rad about the axis v."""
+    """The rotation by the angle |v| (rad) about the axis v."""
     v = np.asarray(rotation_vector, float)
     angle = np.linalg.norm(v)
     return np.append(np.cos(angle / 2), np.sinc(angle / (2 * np.pi)) / 2 * v)
@@ -33,11 +33,11 @@ def to_vector(q):
 
 
 def angle(a, b):
-    """Between two attitudes, rad."""
+    """The angle between two attitudes, rad."""
     return np.linalg.norm(to_vector(product(conjugate(a), b)))
 
 
 def advanced(attitude, rate, seconds):
-    """The attitude of a body that turns at a constant rate, rad/s in body axes."""
+    """The attitude after a rotation at a constant rate, rad/s in body axes."""
     q = product(attitude, from_vector(np.asarray(rate, float) * seconds))
     return q / np.linalg.norm(q)

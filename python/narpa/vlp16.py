@@ -15,9 +15,9 @@ BLOCKS, LASERS = 12, 16
 LASER_PERIOD_S, SEQUENCE_PERIOD_S = 2.304e-6, 55.296e-6
 RANGE_STEP_M, AZIMUTH_STEP_DEG = 0.002, 0.01
 STRONGEST_RETURN, LAST_RETURN, VLP_16 = 0x37, 0x38, 0x22
-NO_REFLECTIVITY = 255  # what a packet has in place of one where there is no return
+NO_REFLECTIVITY = 255  # value in the packet where there is no return
 ELEVATION_DEG = np.array([-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15], float)
-# Height of each laser over the sensor's origin ("vertical correction", table 9-1).
+# Height of each laser above the sensor's origin ("vertical correction", table 9-1).
 HEIGHT_M = 1e-3 * np.array([11.2, -0.7, 9.7, -2.2, 8.1, -3.7, 6.6, -5.1, 5.1, -6.6, 3.7, -8.1, 2.2, -9.7, 0.7, -11.2])
 
 POINT = np.dtype([("position_m", float, 3), ("range_m", float), ("azimuth_rad", float), ("reflectivity", np.uint8),
@@ -27,7 +27,7 @@ FLAG = 0xEEFF  # bytes FF EE
 
 
 def decode(packet):
-    """The returns of a packet as an array of POINT, in firing order. t_s: seconds past the UTC hour."""
+    """The returns of a packet as an array of POINT, in firing order. t_s: seconds after the full UTC hour."""
     if len(packet) != PACKET_BYTES:
         raise ValueError(f"a packet of {len(packet)} bytes, expected {PACKET_BYTES}")
     blocks = np.frombuffer(packet, BLOCK, BLOCKS)
@@ -39,7 +39,7 @@ def decode(packet):
     if mode not in (STRONGEST_RETURN, LAST_RETURN):
         raise ValueError(f"a packet of return mode 0x{mode:02X}, expected one return a shot: 0x37 (strongest) or 0x38 (last)")
     starts = blocks["azimuth_cdeg"] * AZIMUTH_STEP_DEG
-    turns = np.diff(starts) % 360  # from block to block; the last one turns as the one before
+    turns = np.diff(starts) % 360  # between blocks; the last block repeats the value before it
     turns = np.append(turns, turns[-1])
     sequence, laser = np.divmod(np.arange(32), LASERS)
     offset_s = sequence * SEQUENCE_PERIOD_S + laser * LASER_PERIOD_S
@@ -59,7 +59,7 @@ def decode(packet):
 
 
 def encode(azimuths_deg, ranges_m, reflectivities=0, t_s=0.0):
-    """A packet: the azimuth of each block's first shot (12), ranges of 24 x 16 shots (0: no return)."""
+    """Encodes a packet from the azimuths of the first shots of its 12 blocks and the ranges of its 24 x 16 shots (0: no return)."""
     blocks = np.zeros(BLOCKS, BLOCK)
     blocks["flag"] = FLAG
     blocks["azimuth_cdeg"] = np.round(np.asarray(azimuths_deg) / AZIMUTH_STEP_DEG).astype(int) % 36000
@@ -70,7 +70,7 @@ def encode(azimuths_deg, ranges_m, reflectivities=0, t_s=0.0):
 
 
 def receive(port=PORT, host="", timeout_s=None):
-    """Packets as they arrive over UDP, until none has come for so many seconds."""
+    """Yields packets as they arrive over UDP, until none arrives for timeout_s."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         # The default buffer holds 92 packets, 0.12 s. Only root may exceed net.core.rmem_max.
         try:

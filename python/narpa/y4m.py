@@ -1,7 +1,7 @@
-"""YUV4MPEG2 ("Y4M") video: what `narpa run --video CAMERA=FILE.y4m` and its FIFOs carry.
+"""YUV4MPEG2 ("Y4M") video, the format of `narpa run --video CAMERA=FILE.y4m` and of its FIFOs.
 
-Frames are NumPy arrays: height x width of uint8 (Cmono) or uint16 (Cmono16). Streams in colour are not read as arrays:
-`Reader.read_bytes` gives the samples of a frame as they come (C422: Y, U and V planes of YUYV cameras).
+Frames are NumPy arrays: height x width of uint8 (Cmono) or uint16 (Cmono16). Colour streams are not read as arrays:
+`Reader.read_bytes` returns the samples of a frame in stored order (C422: Y, U and V planes of YUYV cameras).
 """
 import os
 import re
@@ -9,14 +9,14 @@ import stat
 
 import numpy as np
 
-SAMPLES = {"mono": 1, "mono16": 2, "422": 2, "444": 3, "420": 1.5, "420jpeg": 1.5}  # bytes a pixel
+SAMPLES = {"mono": 1, "mono16": 2, "422": 2, "444": 3, "420": 1.5, "420jpeg": 1.5}  # bytes per pixel
 
 
 class Reader:
-    """Iterates over the frames of a file, or of a FIFO, which it opens without waiting for the writer."""
+    """Iterates over the frames of a file or a FIFO. Opening a FIFO does not wait for its writer."""
 
     def __init__(self, path):
-        # A FIFO opened for reading and writing does not wait for a writer, and does not end between two of them.
+        # Opened for reading and writing, a FIFO neither waits for a writer nor ends between two writers.
         self.file = os.fdopen(os.open(path, os.O_RDWR if is_fifo(path) else os.O_RDONLY), "rb")
         self.width = self.height = self.colour = self.period_s = None  # known with the first frame
 
@@ -32,7 +32,7 @@ class Reader:
             raise ValueError(f"the stream has C{self.colour} frames, expected one of {', '.join('C' + c for c in SAMPLES)}")
 
     def read_bytes(self):
-        """The samples of the next frame; None at the end of the stream. The next writer of a FIFO begins with a header."""
+        """The samples of the next frame; None at the end of the stream. Each writer of a FIFO begins with a header."""
         line = self.file.readline()
         if line and (self.width is None or line.startswith(b"YUV4MPEG2")):
             self.read_header(line)
@@ -63,7 +63,7 @@ class Reader:
 
 
 class Writer:
-    """Writes grey frames to a file, or to a FIFO, where it waits for a reader."""
+    """Writes grey frames to a file or a FIFO. Opening a FIFO waits for its reader."""
 
     def __init__(self, path, width, height, rate_hz, bits=8):
         self.shape, self.kind = (height, width), np.dtype(np.uint8 if bits == 8 else "<u2")
@@ -73,7 +73,7 @@ class Writer:
                     % (width, height, numerator, denominator, b"mono" if bits == 8 else b"mono16"))  # fmt: skip
 
     def write(self, frame):
-        """Raises BrokenPipeError where the reader of a FIFO has gone."""
+        """Raises BrokenPipeError if the reader of a FIFO has closed it."""
         frame = np.ascontiguousarray(frame, self.kind)
         if frame.shape != self.shape:
             raise ValueError(f"a frame of {frame.shape}, expected {self.shape}")

@@ -1,7 +1,7 @@
 """The textures and the terrain of the gallery's scenes.
 
-Maps come from a folder of real ones (earth-blue-marble.jpg, 2k_mars.jpg, lunar_surface_4096x2048.jpg; longitude across,
-latitude up; missionDEM.tif: heights in metres, 1 m apart, north up); a missing map is generated.
+Maps are taken from a folder of real maps (earth-blue-marble.jpg, 2k_mars.jpg, lunar_surface_4096x2048.jpg; longitude across,
+latitude up; missionDEM.tif: heights in metres, 1 m apart, north up). Missing maps are generated.
 """
 from pathlib import Path
 
@@ -13,7 +13,7 @@ REAL_MAPS = {"earth": "earth-blue-marble.jpg", "mars": "2k_mars.jpg", "moon": "l
 
 
 def make_all(folder, assets=None):
-    """Writes all textures into the folder; maps from the folder `assets` where it has them."""
+    """Writes all textures into the folder. Maps that the folder `assets` has are taken from there."""
     for name, make in {"earth": graticule, "mars": mars, "moon": moon}.items():
         real = Path(assets) / REAL_MAPS[name] if assets else None
         image = cv2.imread(str(real)) if real and real.exists() else make()
@@ -29,7 +29,7 @@ def make_all(folder, assets=None):
 
 
 def make_globe_maps(folder, assets):
-    """Where there is water, lights by night, and clouds. Clouds are made up; water is where the map of heights is black."""
+    """Writes maps of water, night lights and clouds. Clouds are generated. Water is where the height map is black."""
 
     def real(name):
         return cv2.imread(str(assets / name)) if assets and (assets / name).exists() else None
@@ -41,7 +41,7 @@ def make_globe_maps(folder, assets):
         sparks = np.random.default_rng(9).random(SIZE[::-1]) ** 60 * (clouds(10) > 0.6)
         night = np.uint8(255 * sparks[..., None] * np.array([0.5, 0.8, 1.0]))
     water = cv2.GaussianBlur(np.uint8(255 * (heights[..., 0] < 3)), (3, 3), 0)
-    lights = np.clip((np.float64(night[..., 2:]) - 36) * 3.5, 0, 255)  # without the dim blue that shows the continents
+    lights = np.clip((np.float64(night[..., 2:]) - 36) * 3.5, 0, 255)  # remove the dim blue background of the continents
     lights = lights * np.array([0.55, 0.8, 1.0])
     for name, image in {"oceans": water, "earth_night": np.uint8(lights), "clouds": cloud_cover()}.items():
         cv2.imwrite(str(folder / f"{name}.png"), cv2.resize(image, (2048, 1024), interpolation=cv2.INTER_AREA))
@@ -58,7 +58,7 @@ def cloud_cover():
 
 
 def checker(squares):
-    """Light and dark squares in two hues each, so that no two neighbours across the middle are alike."""
+    """Light and dark squares; the dark ones have another hue in the right half, so that the halves differ."""
     y, x = np.indices((512, 512)) * squares // 512
     dark = (x + y) % 2 == 1
     image = np.where(dark[..., None], (96, 60, 30), (235, 240, 245)).astype(np.uint8)
@@ -91,7 +91,7 @@ def graticule():
 
 
 def clouds(seed, octaves=6, first=0):
-    """Noise in 0..1 over a map, the same on its left and right edges. Without the octaves before `first`, which are the widest."""
+    """Noise in 0..1 over a map, periodic in longitude. Octaves below `first` (the coarsest) are left out."""
     random = np.random.default_rng(seed)
     total = np.zeros(SIZE[::-1], np.float32)
     for octave in range(first, octaves):
@@ -131,7 +131,7 @@ def craters():
 
 
 def sphere_normals(heights, radius_m, height_m):
-    """The tangent-space normal map of these heights on a sphere: slopes along east and north."""
+    """The tangent-space normal map of these heights on a sphere, from the slopes along east and north."""
     rows, columns = heights.shape
     latitude = np.pi / 2 - (np.arange(rows) + 0.5) * np.pi / rows
     east = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * height_m / 2

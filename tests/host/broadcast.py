@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""A VLP-16's packets by broadcast and by multicast: to the addresses of a network, to 255.255.255.255 and to a multicast
-group, each with several receivers, which all get the bytes of the capture of the same run; PCL's unmodified grabber decodes
-the broadcasts as it does the capture. In a network namespace of its own, where only loopback exists."""
+"""Sends a VLP-16's packets by broadcast and multicast: to the broadcast address of a network, to 255.255.255.255 and to a
+multicast group. Each has several receivers; all receive the bytes of the capture of the same run. PCL's unmodified grabber
+decodes the broadcast packets and the capture to the same points. Runs in a network namespace with loopback only."""
 import os
 import socket
 import struct
@@ -14,7 +14,7 @@ import support
 from support import expect
 
 try:
-    import can, serial  # noqa: F401: what support.open_bus needs
+    import can, serial  # noqa: F401: needed by support.open_bus
 except ImportError as error:
     support.skip(f"{error} (python3-can, python3-serial)")
 
@@ -23,7 +23,7 @@ from narpa import pcap  # noqa: E402: support has set the path
 RECEIVER = Path(os.environ["NARPA_BUILD_DIR"]) / "bin/pcl_receiver"
 GROUP, TTL = "239.255.23.68", 5
 SINKS = {"network": ("192.168.1.255", 2368, ""), "all": ("255.255.255.255%lo", 2468, ""), "group": (f"{GROUP}%lo", 2568, f",ttl={TTL}")}
-PCL_PORT = 2668  # PCL shares its port with nobody
+PCL_PORT = 2668  # PCL does not share its port with other receivers
 IP_RECVTTL = 12  # linux/in.h; the socket module has no name for it
 COMMANDS, PACE_S = 26, 0.05  # a quarter of a second, in steps of 8 packets
 
@@ -41,7 +41,7 @@ def receiver(port, group=None):
 
 
 def received(s):
-    """All datagrams of data packets, and the times to live that they came with."""
+    """All data packets received, and their IP time-to-live values."""
     packets, ttls = [], set()
     try:
         while True:

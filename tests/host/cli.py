@@ -50,7 +50,7 @@ def check_json():
 
 
 def expect_refusal(status, pattern, *arguments):
-    """The exit status, a message on standard error, and nothing on standard output."""
+    """Expects this exit status, a message on standard error, and nothing on standard output."""
     done = narpa(*arguments, status=status)
     error = done.stderr.decode()
     expect(re.search(pattern, error), f"exit {status}, standard error has /{pattern}/: {error.strip()}")
@@ -80,7 +80,7 @@ def check_exit_codes():
 
 
 def check_names():
-    """Scenes and scenarios by name, and files of the other kind."""
+    """Scenes and scenarios are found by name; a file of the other kind is refused."""
     document = json.loads(narpa("list", "--json").stdout)
     names = {kind: {entry["name"] for entry in document[kind]} for kind in ("scenarios", "scenes")}
     expect({"docking", "rbar", "dispersions"} <= names["scenarios"], f"list names scenarios: {sorted(names['scenarios'])}")
@@ -108,7 +108,7 @@ def check_names():
 
 
 def check_words():
-    """Help without the parser's notation, misspelt words, version."""
+    """Help texts without the parser's notation, suggestions for misspelt words, version."""
     for name in ["", *SUBCOMMANDS, "rehearse", "estimate", "replay"]:
         text = narpa(*([name] if name else []), "--help").stdout.decode()
         for notation in ("TEXT:", "FLOAT:", "INT:", "UINT", "REQUIRED", "Excludes", "Positionals", "[OPTIONS]"):
@@ -130,7 +130,7 @@ def check_words():
 
 
 def check_errors():
-    """They name what was given, and keep what was found."""
+    """Error messages name the wrong input, and partial results are kept."""
     expect_refusal(2, r'--pose "chaser=1,2", expected BODY=', "render", support.SCENE, "--pose", "chaser=1,2", "-o", folder / "a.png")
     expect_refusal(2, "nonsense: is neither a CAN bus nor a video device", "check", support.SCENE, "nonsense")
     done = narpa("check", support.SCENE, "/dev/video99", "--json", status=3)
@@ -154,7 +154,7 @@ def check_errors():
 
 
 def check_numbers():
-    """What is no number, below zero, or named twice is refused, not taken for something else."""
+    """Invalid numbers, negative values and duplicate names are refused, not interpreted otherwise."""
     out = ["-o", folder / "no.png"]
     for arguments in (
         ["run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "nan"],
@@ -176,7 +176,7 @@ def check_numbers():
 
 
 def check_output():
-    """What a command says of its files and its picture."""
+    """Messages about written files and rendered images."""
     aside = folder / "aside.toml"
     aside.write_text('[scene]\nname = "aside"\n[sun]\ndirection = [0.0, -1.0, 0.0]\n[[body]]\nname = "ball"\nsphere = {radius_m = 1.0}\n[[camera]]\nname = "eye"\n'
                      'position_m = [0.0, -9.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\n')  # fmt: skip
@@ -192,7 +192,7 @@ def check_output():
 
 
 def check_sensors():
-    """A camera in its own hull, and the calibration of all."""
+    """Warnings about sensors inside their own body, and the calibration files of the sensors."""
     hull = folder / "hull.toml"
     text = ('[scene]\nname = "hull"\n[sun]\ndirection = [1.0, 0.0, 0.0]\n[[body]]\nname = "craft"\nsphere = {radius_m = 1.0}\n[[camera]]\nname = "eye"\nmount = "craft"\n'
             'position_m = [0.0, 0.0, %s]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\nrate_hz = 1.0\n'
@@ -212,7 +212,7 @@ def check_sensors():
 
 
 def check_exposure():
-    """What saturates or stays black, and the key to set to what: set so, it is good."""
+    """A saturated or black image is reported with a value for exposure_s; with this value the exposure is good."""
     scene = folder / "exposure.toml"
     text = ('[scene]\nname = "exposure"\n[sun]\ndirection = [-1.0, 0.0, 0.0]\n[[body]]\nname = "ball"\nsphere = {radius_m = 1.0}\n'
             '[[camera]]\nname = "eye"\nposition_m = [-5.0, 0.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\n')  # fmt: skip
@@ -233,7 +233,7 @@ def check_exposure():
 
 
 def check_silence():
-    """What takes long says how far it is, and what it waits for."""
+    """Long commands report their progress and what they wait for."""
     flight = folder / "alone.csv"
     flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n0,chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n")
     said = narpa("fly", flight, "--can", f"slcan:{support.free_port()}", "--wait", "3", status=3).stderr.decode()
@@ -243,7 +243,7 @@ def check_silence():
 
 
 def check_modes():
-    """`fly` in another mode than the emulator says so as soon as a heartbeat tells, and plays nothing."""
+    """`fly` in another mode than the emulator fails at the first heartbeat and sends no command."""
     flight = folder / "modes.csv"
     flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
                       + "".join(f"{0.1 * k:.1f},chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n" for k in range(5)))  # fmt: skip
@@ -266,7 +266,7 @@ def check_modes():
 
 
 def check_gone():
-    """`fly` fails where the emulator is gone before the end of the trajectory, and not where it has stopped."""
+    """`fly` fails if the emulator disappears before the end of the trajectory, but not if it was stopped."""
     flight = folder / "gone.csv"
     flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
                       + "".join(f"{0.1 * k:.1f},chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n" for k in range(40)))  # fmt: skip
@@ -304,7 +304,7 @@ def silent_hub():
 
 
 def check_replay():
-    """Every camera of the log is replayed, also where the scene's first is not in it; a log of sweeps alone is not."""
+    """Every camera of the log is replayed, even if it lacks the scene's first camera; a log of LiDAR sweeps alone is refused."""
     scene = folder / "two.toml"
     scene.write_text('[scene]\nname = "two"\n[sun]\ndirection = [1.0, 0.0, 0.0]\n[[body]]\nname = "craft"\nsphere = {radius_m = 1.0}\n'
                      + "".join(f'[[camera]]\nname = "{name}"\nposition_m = [{x}, 0.0, 0.0]\nlook_at = [0.0, 0.0, 0.0]\nresolution = [64, 48]\nfov_horizontal_deg = 40.0\nrate_hz = 5.0\n'
@@ -325,7 +325,7 @@ def check_replay():
 
 
 def check_folders():
-    """One run to a folder at a time."""
+    """A log folder accepts one run at a time."""
     log = folder / "one-log"
     with support.Run(support.SCENE, "--video", f"{support.CAMERA}=none", "--log", log) as run:
         run.wait_for("camera ")

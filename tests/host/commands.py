@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""An unmodified python-can commands poses over slcan (classic frames) and over udp_multicast (CAN FD); the frames that
-come out are byte-identical to `narpa render` at those poses.
+"""Unmodified python-can commands poses over slcan (classic frames) and over udp_multicast (CAN FD). The rendered frames
+are byte-identical to `narpa render` at those poses.
 
 Usage: commands.py slcan|udp_multicast
 """
@@ -20,7 +20,7 @@ def command_and_compare(bus_spec, bus_settings, fd):
     wire = support.Wire()
     video = folder / "nav.y4m"
     with support.Run(support.SCENE, "--can", bus_spec, "--video", f"{support.CAMERA}={video}", "--lockstep") as run:
-        run.wait_for("commands: ")  # it receives from now on
+        run.wait_for("commands: ")  # narpa receives from now on
         bus = support.open_bus(run, **bus_settings)
         for i, pose in enumerate(POSES):
             frame = FIRST_FRAME + i
@@ -39,7 +39,7 @@ def command_and_compare(bus_spec, bus_settings, fd):
     frames = support.read_y4m(video)
     wanted = [support.render(support.SCENE, FIRST_FRAME + i, pose, folder) for i, pose in enumerate(POSES)]
     support.expect_frames(frames, wanted, name)
-    elsewhere = support.render(support.SCENE, FIRST_FRAME, POSES[-1], folder)  # the same frame's noise, another pose
+    elsewhere = support.render(support.SCENE, FIRST_FRAME, POSES[-1], folder)  # same frame number and noise, another pose
     expect(elsewhere != wanted[0], f"{name}: and a frame at another pose differs")
 
 
@@ -50,7 +50,7 @@ def slcan():
 
 
 def udp_multicast():
-    # python-can joins the group by the routing table: a namespace of our own leaves this machine's alone.
+    # python-can selects the interface by the routing table: a network namespace leaves the machine's table unchanged.
     subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
     subprocess.run(["ip", "route", "add", "239.74.163.2/32", "dev", "lo", "src", "127.0.0.1"], check=True)
     command_and_compare("udp:239.74.163.2", {"interface": "udp_multicast", "channel": "239.74.163.2"}, fd=True)

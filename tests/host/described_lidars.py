@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""LiDARs that files describe (scenes/lidars): their packets, read by narpa.points alone, against the truth of each shot."""
+"""LiDARs described by files (scenes/lidars): compares their packets, decoded with narpa.points only, with the truth of each shot."""
 import csv
 import re
 
@@ -10,10 +10,10 @@ try:
     import numpy as np
 except ImportError as error:
     support.skip(f"{error} (python3-numpy)")
-from narpa import points  # noqa: E402  (support has its path)
+from narpa import points  # noqa: E402  (support sets the path)
 
 folder = support.work_folder()
-# Of each instrument: shots a frame; steps of range and velocity.
+# For each instrument: shots per frame, range step (m), velocity step (m/s).
 LIDARS = {"flash": (128 * 128, 0.01, None), "scanner": (250 * 100, 0.001, None), "velocimeter": (3, 0.1, 0.001)}
 
 
@@ -42,7 +42,7 @@ def check(lidar, shots, range_step_m, velocity_step_m_s):
     off = np.abs(got["reflectivity"] - of["reported_reflectivity"]).max()
     expect(off <= 0.51e-3, f"reflectivities within half a step: {off:.2g}")
     t_ns = got["t_unix_ns"] - got["t_unix_ns"][0]
-    expect(np.abs(t_ns - (of["t_ns"] - of["t_ns"][0])).max() < 1000, "times of the shots")  # the CSV's are whole ns in double
+    expect(np.abs(t_ns - (of["t_ns"] - of["t_ns"][0])).max() < 1000, "times of the shots")  # CSV times are read as doubles
     if velocity_step_m_s is None:
         expect(np.isnan(got["velocity_m_s"]).all(), "no velocity")
     else:

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The programs of examples/: dynamics.py and navigation.py close the loop around `narpa run`, emulator.py stands in for it."""
+"""The programs of examples/: dynamics.py and navigation.py close the loop around `narpa run`, emulator.py replaces it."""
 import os
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import support
 from support import expect
 
 try:
-    import can, cv2, msgpack, serial  # noqa: F401: what the examples need
+    import can, cv2, msgpack, serial  # noqa: F401: needed by the examples
 except ImportError as error:
     support.skip(f"{error} (python3-can, python3-msgpack, python3-opencv, python3-serial)")
 
@@ -20,7 +20,7 @@ folder = support.work_folder()
 
 
 def started(name, *command):
-    """A program in the background that has printed "ready", and the file with its output."""
+    """Starts a program in the background and waits until it has printed "ready"; returns it and the file with its output."""
     out = folder / f"{name}.out"
     process = subprocess.Popen([str(c) for c in command], stdout=open(out, "wb"), stderr=subprocess.STDOUT)
     for _ in range(600):
@@ -57,7 +57,7 @@ def check_dynamics_and_navigation(seconds):
         expect(len(done.stdout.splitlines()) == seconds, f"it was commanded {seconds} times: {done.stdout[-300:]}")
         output = finished("navigation.py", *navigation)
         expect(f"{seconds - 1}: off by" in output, "it commanded every period")
-        summary = run.finish()  # by itself, once the dynamics have left
+        summary = run.finish()  # ends by itself when the dynamics have disconnected
         expect(summary["can"]["interface_down"] == 0, "and clients that end are no fault")
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A client that floods the bus costs no command, no command's line in can.log, and does not fail the run."""
+"""A client floods the bus: no command is lost, can.log has every command, and the run does not fail."""
 import importlib.util
 import re
 import socket
@@ -17,7 +17,7 @@ LINE = b"t7F080011223344556677\r"
 
 
 def flood(port):
-    """Sends foreign frames as fast as the hub takes them; returns when it has taken all."""
+    """Sends foreign frames as fast as the hub accepts them; returns when it has accepted all."""
     with socket.create_connection(("127.0.0.1", port)) as client:
         client.sendall(b"O\r")
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A closed loop with a navigation that is not narpa's: `narpa run` renders, narpa-dynamics flies, and
-examples/navigation.py holds station for a minute. The pose commands in narpa's CAN log show how well.
+"""A closed loop with a navigation other than narpa's own: `narpa run` renders, narpa-dynamics flies, and
+examples/navigation.py holds station for a minute. The errors are computed from the pose commands in narpa's CAN log.
 
 Usage: hold_station.py [--real-time]"""
 import math
@@ -13,7 +13,7 @@ import support
 from support import expect
 
 try:
-    import can, cv2, numpy as np, serial  # noqa: F401: what the example needs
+    import can, cv2, numpy as np, serial  # noqa: F401: needed by the example
 except ImportError as error:
     support.skip(f"{error} (python3-can, python3-opencv, python3-serial)")
 from narpa import rotation
@@ -39,7 +39,7 @@ lidars = []
 
 
 def poses(log):
-    """{can_id: {time: pose}} of the whole pose commands in a candump log."""
+    """{can_id: {time: pose}} of the complete pose commands in a candump log."""
     decoder, found = Decoder(Catalogue()), {CHASER: {}, TARGET: {}}
     for line in log.read_text().splitlines():
         identifier, _, data = line.split()[2].partition("#")

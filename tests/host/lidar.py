@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """PCL's unmodified VLP and HDL grabbers decode the packets of a VLP-16 and an HDL-32E that move at 5 m/s and turn at 10
-deg/s, live over UDP and from the captures of the same run. Every point of a whole sweep is where the unit measured it, to 3
-mm, none is missing, none extra; the measured ranges are off the ray-traced ones by the noise of the scene alone.
+deg/s, live over UDP and from the captures of the same run. Every point of a complete sweep is within 3 mm
+of the measured position; no point is missing or extra. Measured and ray-traced ranges differ by the scene's noise only.
 
-What PCL 1.13 neglects (its vlp_grabber.cpp, hdl_grabber.cpp): a laser's own firing time within a sequence of 16 or 32,
-so that all get the azimuth of the sequence's start; the height at which a beam of a VLP-16 crosses the axis; fractions of
-0.01 deg. The first two are corrected here before points are compared; the third is 1 mm at 6 m, part of the 3 mm.
+PCL 1.13 (vlp_grabber.cpp, hdl_grabber.cpp) neglects three effects: the firing time of a laser within a sequence of 16 or
+32 (all get the azimuth of the start of the sequence); the height at which a beam of a VLP-16 crosses the axis; fractions
+of 0.01 deg. The first two are corrected here before points are compared; the third is 1 mm at 6 m, part of the 3 mm.
 """
 import csv
 import math
@@ -18,19 +18,19 @@ import support
 from support import expect
 
 try:
-    import can, serial  # noqa: F401: what support.open_bus needs
+    import can, serial  # noqa: F401: needed by support.open_bus
 except ImportError as error:
     support.skip(f"{error} (python3-can, python3-serial)")
 
 RECEIVER = Path(os.environ["NARPA_BUILD_DIR"]) / "bin/pcl_receiver"
 SWEEP = 1  # counted from 0: between the second and the third passage of azimuth 0
 TOLERANCE_M, NOISE_M = 0.003, 0.02
-# Between commands of 10 ms of flight, 8 packets of the one and 18 of the other: PCL's sockets keep 92, so that PCL may pause
-# for half a second.
+# Each command advances the flight by 10 ms: 8 packets of the VLP-16 and 18 of the HDL-32E. PCL's sockets buffer 92 packets,
+# so PCL may pause for half a second.
 PACE_S = 0.1
 VELOCITY_M_S = (4.0, -0.5, 2.958)  # 5 m/s
 RATE_RAD_S = [math.radians(10) * a for a in (0.48, 0.8, 0.36)]
-# By make: lasers, and vertical corrections, metres (Velodyne, VLP-16 User Manual 63-9243 Rev. D, table 9-1).
+# By model: number of lasers, and vertical corrections in metres (Velodyne, VLP-16 User Manual 63-9243 Rev. D, table 9-1).
 LASERS = {"VLP-16": 16, "HDL-32E": 32}
 CORRECTION_M = {
     "VLP-16": [h * 1e-3 for h in (11.2, -0.7, 9.7, -2.2, 8.1, -3.7, 6.6, -5.1, 5.1, -6.6, 3.7, -8.1, 2.2, -9.7, 0.7, -11.2)],
@@ -43,7 +43,7 @@ def write_scene(folder):
     """The scene's LiDAR with noise, and an HDL-32E beside it."""
     for file in support.SCENE.parent.iterdir():
         (folder / file.name).write_bytes(file.read_bytes())
-    noise = f"\nrange_noise_m = {NOISE_M}\nrange_min_m = 0.2\n"  # beyond the body that carries them
+    noise = f"\nrange_noise_m = {NOISE_M}\nrange_min_m = 0.2\n"  # farther than the body that carries the LiDARs
     second = '[[lidar]]\nname = "side"\nmount = "chaser"\nposition_m = [0.05, 0.0, 0.0]\n'
     second += f'attitude_wxyz = [0.7071067811865476, 0.7071067811865476, 0, 0]\nmodel = "HDL-32E"\nrate_hz = 10{noise}\n[render]'
     head, lidar, tail = support.SCENE.read_text().partition('model = "VLP-16"\nrate_hz = 10')
@@ -53,7 +53,7 @@ def write_scene(folder):
 
 
 def write_trajectory(path):
-    """A shot's own time moves its hit by up to half a metre within the sweep."""
+    """Writes motion so fast that the time of a shot within the sweep moves its hit by up to half a metre."""
     lines = ["t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s"]
     rate = math.hypot(*RATE_RAD_S)
     for i in range(41):
@@ -88,7 +88,7 @@ def read_truth(scene, lidar, trajectory, folder):
 
 
 def split_as_pcl_does(truth, make):
-    """Whole sweeps of hits, each with the azimuth (0.01 deg) that PCL uses: a sweep ends where it decreases."""
+    """Sweeps of hits with the azimuth (0.01 deg) that PCL uses. A sweep ends where this azimuth decreases."""
     sweeps, last, lasers = [[]], -1.0, LASERS[make]
     for at in range(0, len(truth) - 383, 384):
         packet = truth[at : at + 384]
@@ -127,7 +127,7 @@ def compare(points, truth_sweep, make, what):
 
 
 def compare_noise(truth_sweep, what):
-    """Ranges that the unit measured, which PCL has as shown, against the ray-traced ones."""
+    """Compares measured ranges, which PCL decodes correctly (see compare), with the ray-traced ranges."""
     errors = [shot["reported_range_m"] - shot["range_m"] for shot, _, _ in truth_sweep]
     mean, n = sum(errors) / len(errors), len(errors)
     deviation = math.sqrt(sum((e - mean) ** 2 for e in errors) / n)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""`narpa map`: depth and contour lines of the shipped descent and terrain scenes, and of a ball with closed forms; the files are read by
-OpenCV and an XML parser; bad input is refused."""
+"""`narpa map`: depth and contour lines of the shipped descent and terrain scenes, and of a ball with an analytic solution. OpenCV and an
+XML parser read the files. Invalid input is refused."""
 import base64
 import importlib.util
 import json
@@ -48,7 +48,7 @@ def check_depth_of_the_descent():
 
 
 def check_heights_of_the_descent():
-    """Contour lines of the ground: level, closed rings, positions on the level."""
+    """Contour lines of the ground: their levels, closed rings, and positions on the level."""
     summary = mapped("descent", "--of", "height", "--body", "ground", "--interval", "5", "-o", folder / "height.json")
     document = json.loads((folder / "height.json").read_text())
     lines = document["lines"]
@@ -68,8 +68,8 @@ def check_heights_of_the_descent():
 
 
 def check_terrain_against_its_elevation_model():
-    """Heights from three heights of a descent are those of the PNG that the terrain was made of, read by OpenCV. Between its
-    posts there are craters of 2 to 8 m; at a distance there is an error of half a pixel."""
+    """Height maps from three altitudes of a descent agree with the PNG elevation model of the terrain, read by OpenCV. The
+    tolerance covers craters of 2 to 8 m between the model's grid posts and an error of half a pixel."""
     scene = Path(next(s["file"] for s in json.loads(narpa("list", "--json").stdout)["scenes"] if s["name"] == "terrain"))
     posts = cv2.imread(str(scene.with_name("highland.png")), cv2.IMREAD_UNCHANGED)
     ground = 0.01 * posts.astype(np.float32) - 346
@@ -78,7 +78,7 @@ def check_terrain_against_its_elevation_model():
         at = ("terrain", "--time", str(time_s))
         mapped(*at, "-o", folder / "depth.pfm"), mapped(*at, "--of", "height", "-o", folder / "height.pfm")
         depth, height = (cv2.imread(str(folder / f"{name}.pfm"), cv2.IMREAD_UNCHANGED) for name in ("depth", "height"))
-        metres = depth / (320 / math.tan(math.radians(30)))  # a pixel
+        metres = depth / (320 / math.tan(math.radians(30)))  # of a pixel on the ground
         x, y = (column - 319.5) * metres, (239.5 - row) * metres
         expected = cv2.remap(ground, np.float32(512 + x / 4), np.float32(512 - y / 4), cv2.INTER_CUBIC)
         off = np.abs(height - expected)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """A camera operated in real time by the Python package over slcan: triggers at 10 Hz, each with a change of settings.
-Every trigger exposes one frame at its time, with the settings that were promised.
+Every trigger exposes one frame at the time and with the settings stated in the camera's replies.
 
 Usage: operate.py [SECONDS]   (default 6)"""
 import random
@@ -11,7 +11,7 @@ import support
 from support import expect
 
 try:
-    import can, serial  # noqa: F401: what narpa.can needs for slcan
+    import can, serial  # noqa: F401: narpa.can needs them for slcan
 except ImportError as error:
     support.skip(f"{error} (python3-can, python3-serial)")
 from narpa.can import Bus
@@ -21,7 +21,7 @@ MS = 1_000_000
 
 
 def receive_until(bus, name, counter, seconds=5):
-    """The next message of this name and counter; all others are returned too, in their order."""
+    """The next message of this name and counter, and a list of the other messages before it."""
     others, until = [], time.monotonic() + seconds
     while time.monotonic() < until:
         message = bus.receive(0.2)
@@ -42,7 +42,7 @@ random.seed(7)
 with support.Run(scene, "--can", f"slcan:{port}", "--video", f"{support.CAMERA}=none") as run:
     run.wait_for("commands: ")
     bus = Bus(f"slcan:{port}", patience_s=30)
-    promises, starts, states, ledgers = [], [], {}, {}  # promises: when which settings act
+    promises, starts, states, ledgers = [], [], {}, {}  # promises: (time from which the settings apply, settings)
 
     def note(messages):
         for m in messages:
@@ -60,7 +60,7 @@ with support.Run(scene, "--can", f"slcan:{port}", "--video", f"{support.CAMERA}=
         note(others)
         if reply["Answer"] != "accepted":
             expect(False, f"command {k}: {reply['Answer']}")
-        # What is received before the clock's zero may act before it: times are modulo 2^48.
+        # Settings may apply before time 0 of the clock. Such times are negative modulo 2^48.
         promises.append(((reply["Time"] + (1 << 47)) % (1 << 48) - (1 << 47), settings))
         bus.send("CameraTrigger", Cameras=1, AtOnce=1, Time=0)
         reply, others = receive_until(bus, "CameraReply", k % 256)

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""An independent reader (python/narpa/ouster.py) decodes an OS1's packets from a capture, with the metadata beside it: every
-return of a turn, in each profile, lies within half a range step of the ray-traced truth of its own shot, none is missing, none
-extra; identities, numbers and times of columns are as the metadata and the shots have them.
+"""An independent reader (python/narpa/ouster.py) decodes an OS1's packets from a capture with the metadata beside it. In each
+profile every return of a turn is within half a range step of the ray-traced truth of its shot; no return is missing or extra.
+Identifiers, column numbers and times agree with the metadata and the truth.
 """
 import csv
 import json
@@ -18,8 +18,8 @@ except ImportError as error:
 
 BEAMS, MODEL = 16, "os1-16"
 START_NS = 1_795_262_400_000_000_000  # the scene's epoch, 2026-11-21T12:00:00Z
-# Seen from the LiDAR: a ball that the Sun lights from the side, a hill behind it (beams at its edge meet both), and a hill behind
-# the LiDAR; nothing in between.
+# Seen from the LiDAR: a ball that the Sun lights from the side, and a hill behind it (beams at the edge of the ball hit both);
+# in the opposite direction a second hill. In other directions there is nothing.
 SCENE = """
 [scene]
 name = "hills"
@@ -58,7 +58,7 @@ def write_scene(folder, name, keys):
 
 
 def read_truth(scene, folder, *arguments):
-    """Columns of the shots' table as arrays of packets x columns x beams."""
+    """Columns of the table of shots, each as an array of packets x columns x beams."""
     path = folder / "truth.csv"
     support.narpa("scan", scene, *arguments, "-o", path)
     with open(path, newline="") as file:

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""A driver's start with an emulated OS1 on the network: it asks for the firmware, sets where packets go, starts the sensor anew,
-reads the metadata, and decodes with them the packets that then arrive. Malformed, huge and silent clients in between get errors
-and do not disturb the packets.
+"""The start-up sequence of a driver with an emulated OS1 on the network: it reads the firmware version, sets the destination of
+the packets, restarts the sensor, reads the metadata, and decodes the packets that arrive. Clients with malformed or huge
+requests get errors, and they and silent clients do not disturb the packets.
 """
 import json
 import socket
@@ -34,7 +34,7 @@ name = "os1"
 model = "os1-16"
 columns = 512
 """
-CENTRE_M = np.array([0.0, 0.0, 0.0])  # of the shell; the LiDAR's base is there
+CENTRE_M = np.array([0.0, 0.0, 0.0])  # of the shell; the base of the LiDAR is at the same point
 
 
 class Client:
@@ -58,7 +58,7 @@ class Client:
         return 200, ""
 
     def raw(self, data):
-        """What comes back until the server closes."""
+        """Sends data; returns all that is received until the server closes the connection."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=10) as s:
             s.sendall(data)
             answer = b""
@@ -76,7 +76,7 @@ def receiver():
 
 
 def turn_of(s, sensor):
-    """The next whole turn's packets."""
+    """The packets of the next complete turn."""
     packets = []
     while len(packets) < sensor.columns // ouster.COLUMNS:
         packet = sensor.packet(s.recv(65536))
@@ -107,7 +107,7 @@ def expect_silence(s):
 
 
 def start(client, port):
-    """As the maker's driver does."""
+    """Starts the sensor in the sequence of Ouster's driver."""
     firmware = json.loads(client.get("system/firmware"))["fw"]
     expect("v2.4.0" in firmware, f"firmware {firmware}")
     active = json.loads(client.get("sensor/cmd/get_config_param?args=active"))

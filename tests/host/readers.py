@@ -19,7 +19,7 @@ FFMPEG_RAW = {"GREY": "gray", "Y16": "gray16le", "YUYV": "yuyv422"}
 
 
 def await_open(process, path):
-    """Returns when the process has opened the path; opening a FIFO waits for its writer."""
+    """Waits until the process has opened the path; opening a FIFO blocks until there is a writer."""
     files = Path(f"/proc/{process.pid}/fd")
     for _ in range(600):
         if any(os.path.realpath(file) == str(path) for file in files.iterdir()):
@@ -40,7 +40,7 @@ def fly(scene, sinks, await_reader):
             for message in wire.command(pose, frame * support.PERIOD_NS, counter=frame):
                 bus.send(message)
             support.await_ledger(bus, wire, frame)
-        await_reader()  # narpa ends a second after the bus is closed, with or without it
+        await_reader()  # narpa ends one second after the bus is closed, even without a reader
         bus.shutdown()
         return run.stop()
 
@@ -54,7 +54,7 @@ def split(data, size):
 
 
 def start_ffmpeg(path, pixel_format, out):
-    """ffmpeg, given only the file's name, repacking to the layout of narpa's raw frames."""
+    """Starts ffmpeg, given only the file's name, to convert to the layout of narpa's raw frames."""
     command = ["ffmpeg", "-v", "error", "-nostdin", "-i", path, "-f", "rawvideo", "-fps_mode", "passthrough"]
     return subprocess.Popen([*command, "-pix_fmt", FFMPEG_RAW[pixel_format], out])
 
@@ -77,7 +77,7 @@ def start_opencv(path, _, out):
 
 
 def check(tool, start_reader, pixel_format):
-    """The tool reads a FIFO while frames are made, and the file that they went to as well."""
+    """The tool reads a FIFO while frames are rendered, and also the file with the same frames."""
     folder = support.work_folder()
     scene = support.scene_with(folder, pixel_format)
     size = support.WIDTH * support.HEIGHT * support.PIXEL_BYTES[pixel_format]

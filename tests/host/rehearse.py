@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Whole rehearsals and their verdicts.
+"""Rehearsals from start to end, and their verdicts.
 
 Usage: rehearse.py docks       the last ten metres: docks within the docking standard's limits, byte for byte the same on 1 and 2 threads
        rehearse.py fails       the three scenarios that must fail do so, each at its gate
@@ -36,7 +36,7 @@ def failed_gates(verdict):
 
 
 def part_of(scenario, seconds, folder, keys=""):
-    """A file: the scenario ended after so long. `keys`: more of its [scenario], and tables."""
+    """Writes a scenario file with this duration. `keys`: further keys of [scenario], and tables."""
     file = folder / "part.toml"
     file.write_text(f"""
 [scenario]
@@ -75,7 +75,7 @@ def passes_the_same_on_two_threads(name):
     rehearse(SCENARIOS / f"{name}.toml", folder / "two", "--threads", "2")
     for file in ["emulator/can.log", "emulator/nav.ledger.csv", "dynamics/truth.csv", "navigation/navigation.csv"]:
         one, two = ((folder / run / file).read_bytes() for run in ("one", "two"))
-        if file.endswith("ledger.csv"):  # its render times are wall times
+        if file.endswith("ledger.csv"):  # other columns have wall times: compare image_crc32 only
             one, two = ([line.split(b",")[-1] for line in text.splitlines()] for text in (one, two))
         expect(one == two, f"{file} is the same on 1 and on 2 threads")
 
@@ -92,7 +92,7 @@ def fails():
 
 def another():
     try:
-        import can, cv2, serial  # noqa: F401: what the example needs
+        import can, cv2, serial  # noqa: F401: needed by the example
     except ImportError as error:
         support.skip(f"{error} (python3-can, python3-opencv, python3-serial)")
     folder = support.work_folder()
@@ -138,7 +138,7 @@ def dense():
     folder = support.work_folder()
     _, verdict = rehearse(part_of("docking-dense", 12, folder), folder / "out")
     n = verdict["navigation"]
-    # Of a whole docking 201 of 212, most of the others at its end.
+    # In a complete docking 201 of 212 frames give a pose; most of the others are at its end.
     expect(n["with_frames"] >= 11, f"frames gave poses: {n['with_frames']} of {n['estimates']}")
     expect(n["position_m"]["max"] < 0.015, f"largest error at 25 m, by features 20 mm: {n['position_m']['max']}")
     expect(n["nees"] < 14, f"covariances hold: NEES {n['nees']}")

@@ -1,7 +1,7 @@
-"""What the host and kernel tests share: running narpa, commanding it over CAN, reading its files.
+"""Helpers of the host and kernel tests: run narpa, command it over CAN, read its files.
 
 Messages are encoded and decoded by the Python package (python/narpa, checked by tests/python) from the DBC file that narpa
-writes, so that a mistake in narpa's own encoder does not cancel out.
+writes, so that an error in narpa's own encoder is detected.
 """
 import json
 import os
@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python"))
 
 NARPA = os.environ["NARPA_BIN"]
 SCENE = Path(__file__).resolve().parent / "scene/bench.toml"
-BODY, CAN_ID, CAMERA, LIDAR = "chaser", 0x100, "nav", "top"  # of that scene
+BODY, CAN_ID, CAMERA, LIDAR = "chaser", 0x100, "nav", "top"  # names in that scene
 WIDTH, HEIGHT, PERIOD_NS = 160, 120, 100_000_000
 POSITION_PORT_OFFSET = 5940  # of a VLP-16: factory ports 2368 and 8308
 PIXEL_BYTES = {"GREY": 1, "Y16": 2, "YUYV": 2, "RGB24": 3}
@@ -61,8 +61,8 @@ def free_port():
 
 
 def free_lidar_port():
-    """A free UDP port for data packets, with the VLP-16's position port above it free too: both below the ports that the
-    system gives to outgoing connections, so that no other program takes one in between."""
+    """A UDP port for data packets that is free, as is the VLP-16's position port above it. Both are below the range of ephemeral
+    ports, so that no outgoing connection takes one of them."""
     for data in range(20_000 + os.getpid() % 1000, 26_000):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as t:
             try:
@@ -75,7 +75,7 @@ def free_lidar_port():
 
 
 def scene_with(folder, pixel_format):
-    """The scene's file with its camera's pixel format replaced, in `folder`, with its meshes beside it."""
+    """Copies the scene and its meshes to `folder`, with another pixel format of the camera; returns the scene's file."""
     text, changed = re.subn(r'^format = "\w+"', f'format = "{pixel_format}"', SCENE.read_text(), flags=re.M)
     assert changed == 1
     for file in SCENE.parent.iterdir():
@@ -89,7 +89,7 @@ def scene_with(folder, pixel_format):
 
 
 def narpa(*arguments, status=0):
-    """Runs narpa to its end; fails unless it ends with `status`. Returns its CompletedProcess."""
+    """Runs narpa and waits for it; fails unless its exit status is `status`. Returns its CompletedProcess."""
     done = subprocess.run([NARPA, *map(str, arguments)], capture_output=True, timeout=300)
     if done.returncode != status:
         print(done.stderr.decode(errors="replace"))
@@ -98,8 +98,8 @@ def narpa(*arguments, status=0):
 
 
 class Run:
-    """`narpa run` in the background. `stop` ends it as Ctrl-C does, where it has not ended with its commanders in lockstep,
-    and returns its JSON summary."""
+    """`narpa run` in the background. `stop` ends it as Ctrl-C does, unless it has already ended because its clients in
+    lockstep have left, and returns its JSON summary."""
 
     def __init__(self, *arguments):
         self.log = work_folder() / "stderr"
@@ -137,7 +137,7 @@ class Run:
         expect(False, f"narpa run says {pattern} within {seconds} s")
 
     def finish(self, seconds=60):
-        """Waits until it ends by itself."""
+        """Waits until narpa ends by itself."""
         out, _ = self.process.communicate(timeout=seconds)
         if self.process.returncode != 0:
             print(self.stderr())
@@ -151,7 +151,7 @@ class Run:
 
 
 def render(scene, frame, pose, folder):
-    """The bytes that a video device gets for the frame at time frame * period with the body at `pose`."""
+    """The bytes that a video device receives for the frame at time frame * period with the body at `pose`."""
     path = folder / f"frame_{frame}.raw"
     numbers = ",".join(repr(v) for v in (*pose.position, *pose.attitude))
     narpa("render", scene, "--camera", CAMERA, "--frame", frame, "--time", repr(frame * PERIOD_NS * 1e-9),
@@ -163,7 +163,7 @@ def render(scene, frame, pose, folder):
 
 
 class Pose:
-    """A pose as CAN carries it: the given values, rounded to the steps of the DBC. World frame, metres; (w, x, y, z)."""
+    """A pose with values rounded to the resolution of the signals in the DBC. World frame, metres; (w, x, y, z)."""
 
     STEPS = {"Position": 1e-6, "Attitude": 2.0**-22, "Velocity": 2e-5, "Rate": 2e-5}
 
@@ -178,7 +178,7 @@ class Pose:
 
 
 def flight(count):
-    """Poses of a chaser that drifts and turns before the scene's bodies."""
+    """Poses of a chaser that drifts and rotates in front of the scene's bodies."""
     return [
         Pose((0.05 * i, -0.03 * i, 0.08 * i), (1, 0.004 * i, -0.01 * i, 0.006 * i), (0.5, -0.3, 0.8), (0.08, -0.2, 0.12))
         for i in range(count)
@@ -186,7 +186,7 @@ def flight(count):
 
 
 class Wire:
-    """Pose commands and telemetry of the scene as python-can messages, by the DBC file that narpa writes for it."""
+    """Encodes pose commands and decodes telemetry as python-can messages, with the DBC file that narpa writes for the scene."""
 
     def __init__(self):
         from narpa.can import Catalogue, Decoder
@@ -220,7 +220,7 @@ def await_ledger(bus, wire, frame, seconds=30):
 
 
 def open_bus(run, seconds=30, **settings):
-    """A python-can bus, once narpa listens: on a bus without a server, a command sent earlier would be lost."""
+    """Opens a python-can bus after narpa has. On a bus without a server, commands sent earlier would be lost."""
     import can
 
     run.wait_for("commands: ")
@@ -229,7 +229,7 @@ def open_bus(run, seconds=30, **settings):
         run.expect_alive()
         try:
             return can.Bus(**settings)
-        except Exception:  # which one depends on the interface
+        except Exception:  # the type of the exception depends on the interface
             if time.monotonic() > until:
                 raise
             time.sleep(0.1)

@@ -1,15 +1,15 @@
-"""Instructions per primary ray of the direct path: counted by callgrind, held against direct_path.json.
+"""Instructions per primary ray of the direct path, counted by callgrind and compared with direct_path.json.
 
-    count.py check  --narpa BIN --scenes FOLDER ...   exit status 1 beyond the margins, 77 where it cannot be counted
-    count.py renew  (the same)                        writes what is counted into direct_path.json
+    count.py check  --narpa BIN --scenes FOLDER ...   exit status 1 beyond the margins, 77 if it cannot be counted
+    count.py renew  (the same)                        writes the counts to direct_path.json
 
-Counted is narpa::CameraRenderer::render of one frame on one thread, without loading, detector and file. callgrind knows
-no AVX-512, so these are the AVX2 variants; other compilers and Embrees count otherwise, so numbers are compared only
-where these are the ones that they were taken with.
+The count covers narpa::CameraRenderer::render of one frame on one thread, without loading, detector and file output.
+callgrind does not support AVX-512, so the AVX2 variants are counted. Counts depend on the compiler and on Embree:
+they are compared only if both are the versions with which the stored counts were taken.
 
-The craft's numbers are kept in the repository: physics that its scene does not name must not show up in them. The
-Cornell box under the Sun is counted twice in each run, as it is and with everything named beside it that its picture
-does not show: that must not cost anything either.
+The counts of the craft are stored in the repository: models that its scene does not use must not add instructions. The
+Cornell box under the Sun is counted twice in each run: as it is, and with further materials, sensors and other
+elements that do not contribute to the image. They must not add instructions either.
 """
 
 import argparse
@@ -24,9 +24,9 @@ import sys
 import tempfile
 
 NUMBERS = pathlib.Path(__file__).with_name("direct_path.json")
-SIZE = {"craft": 128, "box": 64}  # px a side
-MARGIN = 0.02  # of the numbers kept
-UNUSED_MARGIN = 0.001  # of what the picture does not show
+SIZE = {"craft": 128, "box": 64}  # image width and height, px
+MARGIN = 0.02  # relative margin of the stored counts
+UNUSED_MARGIN = 0.001  # relative margin for elements that the image does not show
 SKIPPED = 77
 
 BOX = f"""
@@ -104,7 +104,7 @@ def skip(why):
 
 
 def small_craft(scenes, folder):
-    """The craft with fewer pixels."""
+    """Writes the craft scene with fewer pixels."""
     source = scenes / "craft"
     resolution = f"resolution = [{SIZE['craft']}, {SIZE['craft']}]"
     text, sizes = re.subn(r"resolution = \[\d+, \d+\]", resolution, (source / "craft.toml").read_text())
@@ -117,7 +117,7 @@ def small_craft(scenes, folder):
 
 
 def box(scenes, folder, unused):
-    """The Cornell box under the Sun, with or without what its picture does not show."""
+    """Writes the Cornell box under the Sun, with or without elements that its image does not show."""
     folder.mkdir()
     (folder / "box.obj").symlink_to((scenes / "cornell" / "box.obj").resolve())
     materials = (scenes / "cornell" / "box.mtl").read_text()
@@ -128,7 +128,7 @@ def box(scenes, folder, unused):
 
 
 def instructions(narpa, scene, spp, name):
-    """Per primary ray of a frame of the scene's first camera."""
+    """Instructions per primary ray of a frame of the scene's first camera."""
     out = scene.parent / name
     done = subprocess.run(
         ["valgrind", "--tool=callgrind", "--collect-atstart=no",
@@ -144,7 +144,7 @@ def instructions(narpa, scene, spp, name):
 
 
 def count(args):
-    """Of the craft by its samples, and of the box without and with what it does not show."""
+    """Counts of the craft by samples per pixel, and of the box without and with the unused elements."""
     scenes = pathlib.Path(args.scenes)
     with tempfile.TemporaryDirectory() as name, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         folder = pathlib.Path(name)

@@ -1,11 +1,11 @@
-"""What each optical stage of a camera adds to a frame of 1024 x 1024: instructions, counted by callgrind, and time.
+"""Cost of each optical stage of a camera in a frame of 1024 x 1024: instructions, counted by callgrind, and time.
 
     stages.py --narpa BIN --scenes FOLDER [--rounds N]
 
-Prints the table of docs/performance.md, section "Optics". Counted is narpa::CameraRenderer::render on one thread, as in
-count.py; its AVX2 variants, as callgrind knows no AVX-512. Times are those of a run's frames on one thread, the least of
-each of N rounds, in which every stage has its turn; 0, the default, leaves them out. Exit status 1 where a function of
-a stage appears in the profile of the frame without any.
+Prints the table of docs/performance.md, section "Optics". The count covers narpa::CameraRenderer::render on one thread, as
+in count.py, in the AVX2 variants: callgrind does not support AVX-512. The time is the shortest frame of a run on one thread,
+over N rounds of all stages; with N = 0, the default, times are not measured. Exit status 1 if a function of a stage
+appears in the profile of the frame without stages.
 """
 
 import argparse
@@ -44,11 +44,11 @@ fov_horizontal_deg = 27.4
 method = "direct"
 spp = {spp}
 """
-BEHIND = "[0.62, -0.48, 0.62]"  # the camera, as in craft.toml
-AHEAD = "[-0.72, 0.28, -0.70]"  # 7 degrees from its axis, behind the craft
+BEHIND = "[0.62, -0.48, 0.62]"  # the Sun is behind the camera, as in craft.toml
+AHEAD = "[-0.72, 0.28, -0.70]"  # the Sun is behind the craft, 7 degrees from the camera's axis
 TURNING = "rate_rad_s = [0.0, 0.0, 0.1]"
 
-# Name, keys of the camera, samples per pixel, other parts of the scene. What follows None is compared with it.
+# Name, keys of the camera, samples per pixel, other parts of the scene. A row with name None is the baseline of the rows after it.
 STAGES = [
     (None, "", 1, {}),
     ("psf, Gaussian of 1 px", "psf = {sigma_px = 1.0}", 1, {}),
@@ -72,7 +72,7 @@ FUNCTIONS = ("ImageOptics::", "SunGhost::", "BrownConrady::", "KannalaBrandt::",
 
 
 def coma_image():
-    """16-bit PGM: a Gaussian of 1 px and a fainter one beside it."""
+    """A PSF as 16-bit PGM: a Gaussian of 1 px and a fainter one beside it."""
     at = lambda x, y: math.exp(-0.5 * (x * x + y * y)) + 0.2 * math.exp(-((x - 2) ** 2 + y * y) / 8)
     samples = [round(60000 * at(x, y) / 1.1) for y in range(-7, 8) for x in range(-7, 8)]
     return b"P5 15 15 65535\n" + b"".join(s.to_bytes(2, "big") for s in samples)
@@ -88,7 +88,7 @@ def write_scenes(folder, scenes):
 
 
 def instructions(narpa, folder, number):
-    """Of one frame."""
+    """Instructions of one frame."""
     profile = folder / f"{number}.callgrind"
     done = subprocess.run(
         ["valgrind", "--tool=callgrind", "--collect-atstart=no",
@@ -102,7 +102,7 @@ def instructions(narpa, folder, number):
 
 
 def seconds(narpa, folder, number):
-    """The least of a run's frames."""
+    """The shortest render time of a run's frames."""
     log = folder / f"log-{number}"
     done = subprocess.run(
         [narpa, "run", str(folder / f"{number}.toml"), "--video", "near=none", "--threads", "1", "--duration", "1.2",
@@ -115,7 +115,7 @@ def seconds(narpa, folder, number):
 
 
 def strange_functions(folder):
-    """Of the stages, in the profile of the frame without any."""
+    """Functions of the stages that appear in the profile of the frame without stages."""
     text = (folder / "0.callgrind").read_text()
     return sorted({name for name in re.findall(r"(?m)^c?fn=\(\d+\) (.+)$", text) if any(f in name for f in FUNCTIONS)})
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""In the rig: cansend commands poses on vcan0, before and after vcan0 has been down; slcand makes a CAN interface of
-narpa's pseudo-terminal."""
+"""In the virtual machine: cansend commands poses on vcan0; the run survives vcan0 going down and up again. slcand makes a CAN
+interface of narpa's pseudo-terminal."""
 import subprocess
 import sys
 import time
@@ -41,7 +41,7 @@ def compare(video, folder, what):
 def vcan(wire):
     folder = support.work_folder()
     video = folder / "nav.y4m"
-    link("vcan0", "txqueuelen", "10")  # as real interfaces have it
+    link("vcan0", "txqueuelen", "10")  # the default of real interfaces
     with start("vcan0", video) as run:
         run.wait_for("vcan0 .*queue of 10 frames.*ip link set vcan0 txqueuelen 1000")
         link("vcan0", "txqueuelen", "1000")
@@ -85,7 +85,7 @@ def slcand(wire):
                 bus.send(message)
             support.await_ledger(bus, wire, frame)
         bus.shutdown()
-        # While narpa still holds the terminal's other end: slcand cannot let go of one that has hung up.
+        # Ended while narpa still has the other end open: slcand cannot release a terminal that has hung up.
         daemon.terminate()
         daemon.wait(timeout=10)
         print(f"slcan0: {run.stop()['can']}")

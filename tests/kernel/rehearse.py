@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""In the rig: the last 0.3 m of a docking on real kernel devices: CAN FD on vcan0, and a navigation whose only sensor is a USB
-camera, which the kernel's uvcvideo has; in lockstep, with small frames. It docks and passes every gate.
+"""In the virtual machine: the last 0.3 m of a docking with kernel devices, in lockstep and with small frames. The bus is CAN FD on
+vcan0; the navigation's only sensor is a USB camera, driven by the kernel's uvcvideo. The chaser docks and passes every gate.
 
 Usage: rehearse.py [BUS]   (outside the rig: rehearse.py slcan:0, with a FIFO in the camera's place)"""
 import json
@@ -54,8 +54,8 @@ def small_scene():
 
 
 def start_navigation(log):
-    """Attaches the camera that the emulator serves and starts the navigation, which `narpa rehearse` asks for: it streams
-    before the first frame is made."""
+    """Attaches the emulated camera and starts the navigation when `narpa rehearse` asks for it. The navigation streams before
+    the first frame is rendered."""
     wait_until = usb_devices.wait_until
     wait_until("narpa rehearse asks for the navigation", lambda: "LOG=" in log.read_text(), 240)
     told = dict(re.findall(r"^  (\w+)=(.*)$", log.read_text(), flags=re.M))
@@ -80,7 +80,7 @@ if on_usb:
 log = folder / "rehearse.err"
 rehearsal = subprocess.Popen([str(c) for c in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=open(log, "w"), text=True)
 navigation = start_navigation(log) if on_usb else None
-out, _ = rehearsal.communicate("\n" if on_usb else None)  # Enter: it listens
+out, _ = rehearsal.communicate("\n" if on_usb else None)  # Enter confirms that the navigation is listening
 if rehearsal.returncode != 0:
     print(out)
     for log in sorted(folder.rglob("*.log")) + sorted(folder.rglob("*.err")):

@@ -1,4 +1,4 @@
-"""USB devices of this machine over USB/IP, for the tests in the rig."""
+"""USB devices of this machine over USB/IP, for the tests in the virtual machine."""
 import subprocess
 import time
 from pathlib import Path
@@ -15,7 +15,7 @@ def wait_until(what, condition, seconds=60):
 
 
 def attach(port):
-    """Once the server listens."""
+    """Attaches the device at this port; retries until the server listens."""
     command = ["usbip", "--tcp-port", str(port), "attach", "-r", "127.0.0.1", "-b", "1-1"]
     wait_until(f"usbip attaches port {port}", lambda: subprocess.run(command, capture_output=True).returncode == 0)
 
@@ -30,7 +30,7 @@ def detach(port):
 
 
 def usb_camera():
-    """The capture device of uvcvideo, or None."""
+    """The capture device that uvcvideo has created for the camera, or None."""
     for folder in sorted(Path("/sys/class/video4linux").glob("video*")):
         if "narpa camera" in (folder / "name").read_text() and (folder / "index").read_text().strip() == "0":
             if (device := Path("/dev") / folder.name).exists():

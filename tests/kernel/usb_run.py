@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""In the rig: narpa run whose only devices are on USB. Poses come through narpa-usbcan, which narpa's own driver has
-(libusb), and frames leave as a USB camera, which the kernel's uvcvideo has. v4l2-ctl and ffmpeg get every frame, byte-identical to
-`narpa render`. Adapter and camera are pulled out and put back; exposure and gain are set with v4l2-ctl.
+"""In the virtual machine: narpa run with USB devices only. Poses arrive through the adapter narpa-usbcan, driven by narpa's own
+driver (libusb). Frames leave through a USB camera, driven by the kernel's uvcvideo. v4l2-ctl and ffmpeg receive every frame,
+byte-identical to `narpa render`. Adapter and camera are detached and attached again; exposure and gain are set with v4l2-ctl.
 
 Usage: usb_run.py NARPA_USBCAN [all]     (all: also YUYV, and OpenCV and GStreamer: minutes more)"""
 import json
@@ -44,7 +44,7 @@ class Flight:
         self.wire, self.sent = wire, 0
 
     def next(self):
-        """The pose of a frame, classic and CAN FD by turns; waits until narpa has made the frame."""
+        """Commands the pose of the next frame, alternately classic and CAN FD, and waits until narpa has rendered the frame."""
         for message in self.wire.command(POSES[self.sent], self.sent * support.PERIOD_NS, self.sent, fd=self.sent % 2 == 1):
             self.bus.send(message)
         ledger = support.await_ledger(self.bus, self.wire, self.sent, 60)
@@ -63,7 +63,7 @@ def read(tool, device, flight, out, frames=FRAMES):
     def begins():
         if reader.poll() is not None:
             expect(False, f"{tool} reads {device}: {Path(f'{out}.log').read_text()[-500:]}")
-        if tool == "GStreamer":  # maps the buffers only when it has a frame
+        if tool == "GStreamer":  # maps its buffers only when it has received a frame
             return any(str(fd.resolve()) == device for fd in Path(f"/proc/{reader.pid}/fd").iterdir())
         return device in Path(f"/proc/{reader.pid}/maps").read_text()
 
@@ -86,8 +86,8 @@ def expect_poses_left(flight):
 
 
 def check_frames(scene, folder, path, first, flight, what, pulled=False):
-    """Consecutive frames from first..sent-1 on, byte for byte: once the stream runs none is lost or repeated. `pulled`: there
-    may be more than FRAMES, and a part of one."""
+    """The file has consecutive frames of first..sent-1, byte-identical: once the stream runs, no frame is lost or repeated. With
+    `pulled` there may be more than FRAMES, and an incomplete last frame."""
     data = path.read_bytes()
     rendered = {}
 
@@ -113,7 +113,7 @@ def controlled(scene):
 
 
 def set_controls(device, flight):
-    """The settings act in the frame that the camera's answer on CAN promises, and in none before."""
+    """The settings apply from the time stated in the camera's reply on CAN, and in no frame before."""
     subprocess.run(["v4l2-ctl", "-d", device, "-c", "exposure_time_absolute=30,gain=600"], check=True)
     promises, states, until = [], {}, time.monotonic() + 60
     for _ in range(4):
@@ -139,7 +139,7 @@ def set_controls(device, flight):
 
 
 def read_until_pulled(device, port, flight, out, frame_bytes):
-    """v4l2-ctl streams; with FRAMES frames in its hands the camera is pulled out. The run goes on without it."""
+    """The camera is detached while v4l2-ctl streams and has received FRAMES frames. The run continues without it."""
     command = READERS["v4l2-ctl"].replace("OUT", str(out)).replace("DEVICE", device).format(n=10000).split()
     with open(f"{out}.log", "w") as log:
         reader = subprocess.Popen(command, stdout=log, stderr=log)
@@ -194,7 +194,7 @@ def session(pixel_format, readers, wire, pulls=False, controls=False):
             run.expect_alive()
             attach(ADAPTER_PORT)
             wait_until("the kernel sees the adapter again, or narpa has it", lambda: len(ports_used()) == 2)
-            time.sleep(3)  # narpa looks once a second
+            time.sleep(3)  # narpa looks for the adapter once a second
             for _ in range(3):
                 flight.next()
             expect(True, "the adapter was pulled out and put back: the run goes on")

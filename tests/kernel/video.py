@@ -1,7 +1,8 @@
 #!/usr/bin/python3
-"""In the rig: poses on vcan0, frames on /dev/video10, read by v4l2-ctl, ffmpeg, GStreamer and OpenCV in turn. In every pixel
-format, each gets frames byte-identical to `narpa render`: by way of a Y4M file of the same run where the format fits in one
-(tests/host/readers.py renders all of its frames, here one). A reader that is killed does not stop the stream."""
+"""In the virtual machine: poses on vcan0, frames on /dev/video10, read by v4l2-ctl, ffmpeg, GStreamer and OpenCV in turn. In every
+pixel format each receives frames byte-identical to `narpa render`. If Y4M supports the format, the reference is a Y4M file of the
+same run, of which one frame is compared with `narpa render` (tests/host/readers.py compares all). A reader that is killed does not
+stop the stream."""
 import subprocess
 import sys
 import threading
@@ -12,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "host"))
 import support
 from support import expect
 
-import cv2  # once, at the start: an emulated processor takes ten seconds for it
+import cv2  # imported once: it takes ten seconds on an emulated processor
 
 DEVICE = "/dev/video10"
 FRAMES_PER_READER = 3
@@ -21,7 +22,7 @@ PACE_S = 0.15
 POSES = support.flight(60)
 IN_Y4M = {"GREY", "Y16", "YUYV"}
 
-# None of them is given the format.
+# The readers are not told the pixel format.
 COMMANDS = {
     "v4l2-ctl": f"v4l2-ctl -d {DEVICE} --stream-mmap --stream-count={FRAMES_PER_READER} --stream-to=OUT",
     "ffmpeg": f"ffmpeg -v error -nostdin -f v4l2 -i {DEVICE} -frames:v {FRAMES_PER_READER} -c:v copy -f rawvideo OUT",
@@ -49,7 +50,7 @@ def expect_running(process):
 
 
 class Flight:
-    """Commands POSES[frame] for frame after frame, in classic frames and CAN FD by turns."""
+    """Commands POSES[frame] frame by frame, alternately in classic frames and CAN FD."""
 
     def __init__(self, run, wire):
         run.wait_for("vcan0")
@@ -65,7 +66,7 @@ class Flight:
         time.sleep(PACE_S)
 
     def until(self, ended, what):
-        """Sends what a reader wants, and if it has missed one, another. `ended(timeout_s)` waits for it."""
+        """Sends as many frames as a reader expects, and one more for each that it missed. `ended(timeout_s)` waits for the reader."""
         for _ in range(FRAMES_PER_READER):
             self.next()
         while not ended(3):
@@ -120,8 +121,8 @@ def kill_a_reader(flight, folder):
 
 
 def reference_frames(scene, pixel_format, video, sent, folder):
-    """All frames of a run as the device has them: from the Y4M file that the run wrote, Y, U and V interleaved again, or, where
-    Y4M cannot hold them, rendered."""
+    """All frames of a run in the device's layout: from the Y4M file of the run, with Y, U and V interleaved again, or rendered if
+    Y4M does not support the format."""
     if not video:
         return [support.render(scene, frame, POSES[frame], folder) for frame in range(sent)]
     frames, last = support.read_y4m(video), sent - 1
@@ -155,15 +156,15 @@ def expect_from(reference, path, first, sent, what):
 def check_format(pixel_format, wire):
     folder = support.work_folder()
     scene = support.scene_with(folder, pixel_format)
-    readings = []  # name, first frame that it can have got, one past the last
+    readings = []  # name of the reader, first frame that it can have received, one past the last
     video = folder / "nav.y4m" if pixel_format in IN_Y4M else None
     sinks = [word for sink in (DEVICE, video) if sink for word in ("--video", f"{support.CAMERA}={sink}")]
     with support.Run(scene, "--can", "vcan0", *sinks, "--lockstep") as run:
         flight = Flight(run, wire)
-        flight.next()  # the device is a camera once a frame has been written
+        flight.next()  # the device becomes a capture device with the first frame
 
         def reading(name, read, *arguments):
-            first = flight.sent - 1  # a reader begins with the last frame before it came
+            first = flight.sent - 1  # the first frame a reader receives is the last one before it was started
             read(*arguments, flight, folder / name)
             readings.append((name, first, flight.sent))
 

@@ -1,5 +1,5 @@
 """Checks the one-definition rule for types: no two sources define a type of the same name outside an unnamed namespace. No
-compiler sees this where the two are in different translation units; a program then uses one of them for both.
+compiler detects this in different translation units; a program would use one of the definitions for both.
 
 Usage: definitions.py SOURCE_DIR FOLDER...
 """
@@ -13,7 +13,7 @@ NAMESPACE = re.compile(r"namespace ([\w:]*) ?\{")
 
 
 def types_of(file):
-    """(type with its namespaces, line) of each type that the file defines at namespace scope with external linkage."""
+    """(qualified name, line) of each type that the file defines at namespace scope with external linkage."""
     namespaces = []
     for number, line in enumerate(file.read_text().splitlines(), 1):
         if opened := NAMESPACE.match(line):

@@ -1,5 +1,5 @@
-"""Checks that every #include of a library's files points to the library itself or to a library that it links, and that x.cpp
-includes x.h before anything else, so that x.h compiles alone.
+"""Checks that every #include in a library refers to the library itself or to a library that it links, and that x.cpp
+includes x.h first, so that x.h compiles alone.
 
 Usage: includes.py LIBRARIES SOURCE_DIR    LIBRARIES: lines of "folder: linked linked ..."
 """
@@ -15,7 +15,7 @@ for line in lists.splitlines():
 
 
 def reachable(library):
-    """The library and all that it links, directly or through others; "renderer" stands for every library below it."""
+    """The library and all libraries that it links, directly or indirectly; "renderer" means every library below it."""
     seen, todo = set(), [library]
     while todo:
         here = todo.pop()

@@ -1,4 +1,4 @@
-"""Checks an installed tree: what it has, that its programs start and find their files there, and its size.
+"""Checks an installed tree: its files, its size, and that its programs start and find their files there.
 
 Usage: contents.py PREFIX
 """
@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-MOST_MB = 130  # two thirds are the meshes of the scenes
+MOST_MB = 130  # the meshes of the scenes are two thirds of it
 IMPORT_EXAMPLE = """
 import sys
 sys.path = [sys.argv[1]] + [path for path in sys.path if "share/narpa" not in path]

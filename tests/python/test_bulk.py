@@ -1,4 +1,4 @@
-"""narpa.bulk: the bytes that narpa's own decoder is tested with, and streams with spoilt frames in them."""
+"""narpa.bulk: the test bytes of narpa's own decoder, and streams with corrupted frames."""
 import io
 import unittest
 
@@ -9,7 +9,7 @@ needs.modules("numpy")
 import numpy as np
 from narpa import bulk
 
-# As in tests/protocols/video_bulk_frame.cpp.
+# The same bytes as in tests/protocols/video_bulk_frame.cpp.
 HEADER = bytes.fromhex("4e52504601003000feffffffffffffff0403020159313620"
                        "80020000e00100000005000000600900443322113f2e0792")  # fmt: skip
 

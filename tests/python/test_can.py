@@ -1,4 +1,4 @@
-"""narpa.dbc and narpa.can: against the example in protocols/can/README.md, and against canmatrix for every signal."""
+"""narpa.dbc and narpa.can, compared with the example in protocols/can/README.md and, for every signal, with canmatrix."""
 import logging
 import unittest
 
@@ -9,7 +9,7 @@ needs.modules("can", "canmatrix", "numpy")
 from narpa import dbc
 from narpa.can import Bus, Catalogue, Decoder, checksum, crc8, crc16
 
-# protocols/can/README.md, "A worked example".
+# From protocols/can/README.md, "A worked example".
 EXAMPLE = {"Time": 1_250_000_000, "Position": (1, -2, 10.5), "Attitude": (0.6, 0, 0.8, 0), "Velocity": (0, 0, -0.1), "Rate": (0, 0.01, 0)}
 CLASSIC = """100#807C814A000007D4 101#40420F000000076B 102#807BE1FFFFFF0749 103#A037A00000000700 104#66662600000007CA
 105#33333300000007CA 106#0000000000000733 107#000000007D00079B 108#78ECFF3F0000079A""".split()
@@ -40,7 +40,7 @@ class Encoding(unittest.TestCase):
         messages = dbc.read()
         self.assertEqual(messages.keys(), frames.keys())
         for identifier, message in messages.items():
-            # A value of its own for every signal, far from 0.
+            # A different value for every signal, far from 0.
             raw = {s.name: (3 + 5 * k) % (1 << min(s.length - 1, 16)) for k, s in enumerate(message.signals.values())}
             values = {name: number * message.signals[name].factor for name, number in raw.items()}
             decoded = frames[identifier].decode(bytearray(message.encode(values)))

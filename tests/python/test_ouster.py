@@ -1,4 +1,4 @@
-"""narpa.ouster: fields of recorded packets as the maker's own decoder reads them, by its digests, and geometry."""
+"""narpa.ouster: fields of recorded packets, compared with the digests of Ouster's own decoder, and geometry."""
 import hashlib
 import json
 import math
@@ -23,7 +23,7 @@ METADATA = {
 
 
 def md5(values, kind):
-    """Of a digest: beams before columns."""
+    """The MD5 of values in the digests' order: beams before columns."""
     return hashlib.md5(np.ascontiguousarray(values.astype(kind)).tobytes()).hexdigest()
 
 
@@ -57,7 +57,7 @@ class Recordings(unittest.TestCase):
 class Geometry(unittest.TestCase):
     def test_of_the_makers_formula_by_hand(self):
         sensor = ouster.Sensor(METADATA)
-        # Column 0 is along the lidar's x, 0.1 m out; the first beam is turned by -90 deg from there, to -y, and 30 deg up.
+        # Column 0 points along the lidar's x, 0.1 m from the axis. The first beam is rotated by -90 deg from there, to -y, and 30 deg up.
         points = sensor.positions(np.array([0, 128]), np.full((2, 2), 2100.0))
         up, out = 2 * math.sin(math.radians(30)), 2 * math.cos(math.radians(30))
         expected = [[(-0.1, out, 0.05 + up), (-0.1 - out, 0, 0.05 - up)],

@@ -1,6 +1,6 @@
-"""narpa.plots and the program narpa-plot: every kind of document becomes a picture, and what is wrong is said.
+"""narpa.plots and the program narpa-plot: every kind of document becomes a picture, and invalid documents give an error message.
 
-With NARPA_PLOTS=FOLDER the pictures are left there, to be looked at.
+With NARPA_PLOTS=FOLDER the pictures are kept there for inspection.
 """
 import base64
 import json

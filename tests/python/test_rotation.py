@@ -1,4 +1,4 @@
-"""narpa.rotation: laws of rotations, also at and near no rotation and half a turn."""
+"""narpa.rotation: identities of rotations, also at and near angles of 0 and 180 degrees."""
 import unittest
 
 import needs

@@ -15,7 +15,7 @@ needs.modules("numpy")
 import numpy as np
 from narpa import vlp16
 
-AZIMUTHS = (350 + 0.4 * np.arange(12)) % 360  # deg: past 0 within the packet
+AZIMUTHS = (350 + 0.4 * np.arange(12)) % 360  # deg: crosses 0 within the packet
 
 
 def free_port():
@@ -42,7 +42,7 @@ class Packets(unittest.TestCase):
         ranges = np.zeros((24, 16))
         ranges[4, 15], ranges[23, 0] = 10.0, 20.0
         first, second = vlp16.decode(packet(ranges))
-        # Sequence 4 begins block 2; laser 15 fires 15 * 2.304 us later, of 110.592 us that 0.4 degrees take.
+        # Sequence 4 begins block 2. Laser 15 fires 15 * 2.304 us later; the rotor turns 0.4 degrees in 110.592 us.
         azimuth, elevation = np.radians(350.8 + 0.4 * 15 * 2.304 / 110.592), np.radians(15)
         expected = 10 * np.array([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
         np.testing.assert_allclose(first["position_m"], expected + [0, 0, -0.0112], atol=1e-9)
@@ -71,7 +71,7 @@ class Packets(unittest.TestCase):
             self.skipTest(f"net.core.rmem_max is {limit}, and only root may exceed it")
         port = free_port()
         packets = vlp16.receive(port, "127.0.0.1", timeout_s=0.2)
-        self.assertEqual(list(packets), [])  # it binds when it is first read
+        self.assertEqual(list(packets), [])  # the socket is bound at the first read
         packets = vlp16.receive(port, "127.0.0.1", timeout_s=5)
         data = packet(np.zeros((24, 16)))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:

@@ -1,4 +1,4 @@
-"""narpa.y4m: what is written is read back, over files and FIFOs, and by the headers that narpa writes."""
+"""narpa.y4m: written frames are read back from files and FIFOs; the headers that narpa writes are read."""
 import os
 import tempfile
 import threading
@@ -60,7 +60,7 @@ class Video(unittest.TestCase):
     def test_a_fifo_carries_frames(self):
         os.mkfifo(self.path)
         reader = y4m.Reader(self.path)
-        writer = y4m.Writer(self.path, 320, 240, 1)  # each frame is longer than what a FIFO holds
+        writer = y4m.Writer(self.path, 320, 240, 1)  # each frame is larger than the buffer of a FIFO
         frame = np.random.default_rng(1).integers(0, 255, (240, 320), np.uint8)
         thread = threading.Thread(target=writer.write, args=[frame])
         thread.start()

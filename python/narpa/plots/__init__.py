@@ -1,7 +1,7 @@
-"""Plots of what narpa measured, drawn with matplotlib from the JSON documents that its commands write.
+"""Plots of narpa's results, drawn with matplotlib from the JSON documents that its commands write.
 
-Each document names its kind under the key "plot". A kind is a function that takes the document and returns a
-matplotlib figure, or several by name. It stands in one of the modules of this package:
+Each document names its kind under the key "plot". For each kind there is a function that takes the document and returns
+a matplotlib figure, or a dictionary of figures by name. The functions are in the modules of this package:
 
     bench        convergence, ladder, loop: `narpa bench render` and `narpa bench loop`
     estimation   estimates, approach, approach_frames, stereo, icp, filter, estimators: `narpa estimate`, `bench estimate`;
@@ -16,8 +16,8 @@ import logging
 import sys
 from pathlib import Path
 
-PICTURES = (".png", ".svg", ".pdf")  # how names of pictures end
-MATPLOTLIB_MISSING = 3  # exit status: a dependency is missing, as narpa's own
+PICTURES = (".png", ".svg", ".pdf")  # file extensions of pictures
+MATPLOTLIB_MISSING = 3  # exit status, as narpa's: a dependency is missing
 
 
 def drawers():
@@ -27,7 +27,7 @@ def drawers():
 
 
 def draw(document, output, picture_format=None):
-    """Draws the document into a file, or into a folder where it has several charts. Returns the files written."""
+    """Draws the document into a file, or into a folder if it has several charts. Returns the files written."""
     from narpa.plots import style
 
     kinds = drawers()

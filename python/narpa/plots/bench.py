@@ -9,7 +9,7 @@ from narpa.plots.style import BLUE, CYCLE, GREY, ORANGE, SKY, VERMILION, GREEN, 
 
 
 def convergence(document):
-    """Error over samples per pixel and over time; the grey lines fall as independent samples would, with slope -1/2."""
+    """Error over samples per pixel and over time. The grey lines have slope -1/2, the convergence of independent samples."""
     drawn = figure(11, 5, document["title"])
     panels = drawn.subplots(1, 2)
     errors = (("rmse", "slope", "of the mean radiance", document["reference"]["mean"], BLUE),
@@ -37,11 +37,11 @@ def convergence(document):
 KINDS_OF_RUNGS = (("plain loop, fixed spp", GREY, True, False), ("narpa, fixed spp", BLUE, False, False),
                   ("narpa, budget in rays/px", VERMILION, False, True))  # fmt: skip
 PHASE_COLOURS = ("#bebe78", BLUE, GREEN, PURPLE, VERMILION, "#aaaaaa", ORANGE, SKY)
-COMPLETE_STEPS = ("refined", "one_sample")  # frames that leave nothing out
+COMPLETE_STEPS = ("refined", "one_sample")  # steps that render the complete frame
 
 
 def ladder(document):
-    """For each scene error over time, and below it where the time of each budget goes."""
+    """For each scene: error over time, and below it the phases of each budget's render time."""
     scenes = document["scenes"]
     columns = min(3, max(1, len(scenes)))
     rows = math.ceil(len(scenes) / columns)
@@ -90,7 +90,7 @@ def ladder_errors(axes, scene):
 
 
 def ladder_bars(axes, scene):
-    """The parts of each frame's time; returns their names."""
+    """The share of each phase in the frame's time; returns the names of the phases."""
     rungs = [r for r in scene["rungs"] if not r["loop"]]
     names = []
     for y, r in enumerate(rungs):
@@ -118,7 +118,7 @@ LOOP_PANELS = (("wake_late_ms", "wake-up latency, ms", True), ("hand_over_ms", "
 
 
 def loop(document):
-    """For each camera how many frames exceed which time, alone and beside load."""
+    """For each camera: the share of frames that exceed a time, over the time, with and without load."""
     runs = document["runs"]
     cameras = runs[0]["cameras"] if runs else []
     drawn = figure(13, 3.9 * max(1, len(cameras)) + 0.5, document["title"])

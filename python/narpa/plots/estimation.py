@@ -10,7 +10,7 @@ QUANTITIES = (("rotation", "rad", "attitude error, deg", math.degrees(1)), ("pos
 
 
 def estimates(document):
-    """Errors of every frame over time, within three standard deviations and above the Cramer-Rao bound."""
+    """Errors of every frame over time, with three standard deviations and the Cramer-Rao bound."""
     frames = document["frames"]
     drawn = figure(11, 8, document["title"])
     t = column(frames, "t_s")
@@ -28,7 +28,7 @@ def estimates(document):
 
 
 def approach(document):
-    """Errors and bounds over the range, and from how far off the pose is found."""
+    """Errors and bounds over range, and the convergence basin: share of poses found over the error of the start."""
     drawn = figure(9.5, 10.5, document["title"])
     *panels, basin = drawn.subplots(3, 1, gridspec_kw={"height_ratios": [3, 3, 2.4]})
     for axes, (quantity, unit, name, scale) in zip(panels, QUANTITIES):
@@ -72,7 +72,7 @@ def approach_frames(document):
 
 
 def boxes(axes, points, unit):
-    """Quartiles, whiskers to 1.5 of their distance (Tukey 1977) and outliers for x, y and z, both ways of matching."""
+    """Box plots for x, y and z and both ways of matching: whiskers to 1.5 interquartile ranges (Tukey 1977), outliers."""
     for name, colour, shift in (("whole_pixels", VERMILION, -0.2), ("between_pixels", BLUE, 0.2)):
         errors = np.abs([p[f"{name}_error_m"] for p in points])
         if unit == "%":
@@ -81,7 +81,7 @@ def boxes(axes, points, unit):
         axes.boxplot(errors, positions=np.arange(3) + shift, widths=0.32, boxprops=line, whiskerprops=line, capprops=line,
                      medianprops={**line, "linewidth": 2}, flierprops={"marker": "+", "markeredgecolor": colour})  # fmt: skip
         axes.plot([], [], color=colour, label=name.replace("_", " "))
-    # Errors far below the quartiles say nothing, but would stretch the axis.
+    # Errors far below the quartiles are not informative and would stretch the axis.
     quartiles = [np.percentile(np.abs([p["between_pixels_error_m"] for p in points]), 25, axis=0).min()]
     if unit != "%" and quartiles[0] > 0:
         axes.set_ylim(bottom=0.05 * quartiles[0])
@@ -92,7 +92,7 @@ def boxes(axes, points, unit):
 
 
 def comparison(document):
-    """A frame, the render scaled to its brightness, and what is left: red where the frame is brighter."""
+    """A frame, the render scaled to its brightness, and the residual: red where the frame is brighter."""
     frame, render, residual = (image(document[name]) for name in ("frame", "render", "residual"))
     height, width = frame.shape
     wide = width > 1.8 * height
@@ -109,7 +109,7 @@ def comparison(document):
 
 
 def stereo(document):
-    """Matches over the left frame, and errors of the points by whole pixels and between pixels."""
+    """Matches over the left frame, and errors of the points for whole-pixel and sub-pixel matching."""
     points = document["matches"]
     title = (f"{document['scene']}: {len(points)} points, depth {document['gain']:.1f} times better between pixels; "
              f"squared error over predicted variance {document['mean_normalised_squared']:.2f}")  # fmt: skip
@@ -127,7 +127,7 @@ def stereo(document):
 
 
 def icp(document):
-    """The part of the starts that found the pose, by angle and distance of the start."""
+    """The share of starts from which the pose was found, over angle and distance of the start."""
     runs = document["runs"]
     angles, distances = (sorted({run[key] for run in runs}) for key in ("start_angle_deg", "start_distance_fraction"))
     drawn = figure(max(6, 1.6 * len(angles) + 1.5), 1.1 * len(distances) + 1.6, document["title"])
@@ -149,7 +149,7 @@ def icp(document):
 
 
 def filter_nees(document):
-    """Normalised estimation error squared over time, with the band that holds 95 % of a consistent filter's."""
+    """NEES (normalised estimation error squared) over time, with the 95 % band of a consistent filter."""
     runs = document["runs"]
     rows = math.ceil(len(runs) / 2)
     drawn = figure(11, 3.1 * rows + 0.4, document["title"])
@@ -168,7 +168,7 @@ def filter_nees(document):
 
 
 def estimators(document):
-    """Every estimator: time of an estimate against its position error."""
+    """Position error over the time of an estimate, for every estimator."""
     drawn = figure(9.5, 6.8, "Position error, RMS, against the time of an estimate")
     axes = drawn.subplots()
     families = list(dict.fromkeys(e["family"] for e in document["estimators"]))
@@ -187,7 +187,7 @@ def estimators(document):
 
 
 def label_points(axes, points):
-    """Names beside their points, moved up or down where another point or name is."""
+    """Writes names beside their points, moved up or down to avoid other points and names."""
     axes.autoscale_view()
     axes.figure.canvas.draw()
     to_pixels = axes.transData.transform

@@ -1,19 +1,19 @@
-"""The charts of a rehearsal's page and of a campaign's page. Positions are of the chaser's port in the target's port axes."""
+"""Charts of the pages of a rehearsal and of a campaign. Positions: the chaser's port in the axes of the target's port."""
 import math
 
 import numpy as np
 
 from narpa.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, figure
 
-PHASE_COLOURS = {"holding": GREEN, "transferring": SKY}  # others take turns
+PHASE_COLOURS = {"holding": GREEN, "transferring": SKY}  # other phases cycle through OTHER_PHASES
 OTHER_PHASES = (ORANGE, PURPLE, VERMILION, GREY)
-WIDE, HALF = 11.6, 5.7  # inches: one or two charts a row
-CIRCLES = 40  # of estimates in a view
-ROWS_OF_SAMPLES = 3000  # that an SVG holds; more are thinned out
+WIDE, HALF = 11.6, 5.7  # inches: widths for one and two charts in a row
+CIRCLES = 40  # largest number of estimates drawn in a view
+ROWS_OF_SAMPLES = 3000  # largest number in an SVG; more are decimated
 
 
 def thin(rows):
-    """At most so many rows, evenly spread."""
+    """At most ROWS_OF_SAMPLES of the rows, evenly spaced."""
     rows = np.asarray(rows, float)
     return rows[:: max(1, math.ceil(len(rows) / ROWS_OF_SAMPLES))]
 
@@ -24,13 +24,13 @@ def circle(axes, radius, colour, label=None, style="--"):
 
 
 def half_width(document, axis):
-    """Half the width that shows the path across, and little else."""
+    """Half the width of a view that contains the path across this axis, with a small margin."""
     values = [abs(row[axis]) for row in (*document["truth"]["position_m"], *document["holds_m"])]
     return 1.3 * max([0.15, *values])
 
 
 def view(document, title, along, across):
-    """The approach along one pair of axes."""
+    """The approach, projected on two axes."""
     drawn = figure(HALF, 3.4)
     axes = drawn.subplots()
     gates, truth = document["gates"], thin(document["truth"]["position_m"]).reshape(-1, 3)
@@ -51,7 +51,7 @@ def view(document, title, along, across):
         circle(axes, gates["distance_m"][1], VERMILION)
     axes.plot(truth[:, along], truth[:, across], color=BLUE, linewidth=1.8, label="true")
     estimated = np.array(document["estimates"]["port_position_m"], float).reshape(-1, 3)
-    estimated = estimated[:: max(1, len(estimated) // CIRCLES)]  # open circles, so that the line is seen through them
+    estimated = estimated[:: max(1, len(estimated) // CIRCLES)]  # open circles keep the line visible
     axes.plot(estimated[:, along], estimated[:, across], "o", color=VERMILION, markersize=4, markerfacecolor="none",
               markeredgewidth=0.9, label="estimated")  # fmt: skip
     holds = np.array(document["holds_m"], float).reshape(-1, 3)
@@ -64,7 +64,7 @@ def view(document, title, along, across):
 
 
 def labelled(drawn, axes, title, x, y):
-    """Title, names of the axes, and the legend between title and axes, in rows of four."""
+    """Adds title, axis labels, and a legend between title and axes in rows of four."""
     entries = len(axes.get_legend_handles_labels()[0])
     rows = -(-entries // 4)
     axes.set_title(title, loc="left", pad=6 + 14 * rows)
@@ -105,7 +105,7 @@ def profile(document):
 
 
 def track(document):
-    """The last of the descent from above, with the circle about the site that it may land in."""
+    """The last part of the descent from above, with the circle of allowed landing positions around the site."""
     drawn = figure(HALF, 3.4)
     axes = drawn.subplots()
     limit = document["landing"]["from_site_m"]
@@ -138,7 +138,7 @@ def landing(document):
 
 
 def shade_phases(document, axes):
-    """The guidance's phases behind the curves, with the number of the leg where there is room for it."""
+    """Shades the guidance's phases behind the curves; phase and leg are written where there is room."""
     span = max(1e-9, document["t_end_s"])
     others = {}
     for phase in document["phases"]:
@@ -163,18 +163,18 @@ def over_time(document, title, unit, curves, limits=(), allowed="closing rate al
 
 
 def error_chart(document, quantity, axis):
-    """One component of the navigation error within three of its standard deviations."""
+    """One component of the navigation error with its 3-sigma band."""
     e, contact = document["estimates"], document["contact"]
     scale, unit, stored = (100, "cm", "m") if quantity == "position" else (math.degrees(1), "deg", "rad")
     error, sigma = (scale * np.array(e[f"{quantity}_{what}_{stored}"])[:, axis] for what in ("error", "sigma"))
     rows = np.column_stack([e["t_s"], error, 3 * sigma])
     if contact and contact["captured"]:
-        rows = rows[rows[:, 0] <= contact["t_s"]]  # then both are one body
+        rows = rows[rows[:, 0] <= contact["t_s"]]  # after capture the two bodies are one
     drawn = figure(0.66 * HALF, 2.35)
     axes = drawn.subplots()
     if len(rows):
         settled = np.abs(rows[rows[:, 0] > 0.03 * document["t_end_s"], 1])
-        span = max(1.25 * settled.max(initial=0), 1.2 * np.median(rows[:, 2]), 1e-6)  # the start would hide the rest
+        span = max(1.25 * settled.max(initial=0), 1.2 * np.median(rows[:, 2]), 1e-6)  # the transient at the start would dominate the scale
         t, error, sigma = thin(rows).T
         axes.fill_between(t, np.maximum(-sigma, -span), np.minimum(sigma, span), color=SKY, alpha=0.3, linewidth=0, label="3 sigma")
         axes.plot(t, error, color=BLUE, linewidth=1.2, label="error")
@@ -189,7 +189,7 @@ def error_chart(document, quantity, axis):
 
 
 def thruster_charts(document):
-    """The impulses that the navigation commanded, and the delta-v so far."""
+    """The commanded impulses, and the accumulated delta-v."""
     commands, charts = document["thrusters"], {}
     t, impulses = np.array(commands["t_s"], float), np.array(commands["impulse_n_s"], float).reshape(-1, 3)
     drawn = figure(WIDE, 2.7)

@@ -1,4 +1,4 @@
-"""What all plots share: colours, figures, images within documents, robust logarithmic axes."""
+"""Helpers of all plots: colours, figures, images in documents, robust logarithmic axes."""
 import base64
 import math
 
@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-# Colours that people with any colour vision can tell apart (M. Okabe, K. Ito, 2008).
+# Colours that remain distinct in all kinds of colour blindness (M. Okabe, K. Ito, 2008).
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 SKY, PURPLE, GREY, INK = "#56B4E9", "#CC79A7", "#8a8f98", "#1d232b"
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, GREY)
@@ -22,7 +22,7 @@ def context():
 
 
 def figure(width, height, title=""):
-    """A figure in inches that makes room for labels by itself."""
+    """A figure with automatic layout; width and height in inches."""
     made = Figure(figsize=(width, height), constrained_layout=True)
     if title:
         made.suptitle(title)
@@ -30,7 +30,7 @@ def figure(width, height, title=""):
 
 
 def number(value):
-    """NaN for null, which is how JSON writes numbers that are not finite."""
+    """NaN for null: numbers that are not finite are null in JSON."""
     return math.nan if value is None else value
 
 
@@ -39,13 +39,13 @@ def column(rows, key):
 
 
 def positive(values):
-    """For a logarithmic axis: NaN where there is no logarithm."""
+    """The values with NaN in place of those that a logarithmic axis cannot show."""
     values = np.asarray(values, float)
     return np.where(values > 0, values, np.nan)
 
 
 def image(document):
-    """An image of a document as an array: height x width x 3, or height x width for grey."""
+    """Decodes an image of a document to an array: height x width x 3, or height x width for grey."""
     pixels = np.frombuffer(base64.b64decode(document["base64"]), np.uint8)
     shape = (document["height"], document["width"], document["channels"])
     return pixels.reshape(shape if document["channels"] > 1 else shape[:2])
@@ -60,7 +60,7 @@ def show_image(axes, pixels, title="", **how):
 
 
 def plain_ticks(axis):
-    """Numbers as 0.5 and 20, not as powers of ten."""
+    """Labels a logarithmic axis with plain numbers (0.5, 20) instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     decades = abs(math.log10(axis.get_view_interval()[1] / axis.get_view_interval()[0]))

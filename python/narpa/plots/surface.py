@@ -1,4 +1,4 @@
-"""The picture of `narpa map`: depth or height in false colour over a hill shading, with contour lines."""
+"""The picture of `narpa map`: depth or height in false colour with hill shading and contour lines."""
 import base64
 
 import numpy as np
@@ -9,8 +9,8 @@ from matplotlib.contour import ContourSet
 
 from narpa.plots.style import figure, image
 
-INDEX_EVERY = 5  # of many levels is thicker and labelled
-FEW_LEVELS = 12  # are all labelled
+INDEX_EVERY = 5  # every fifth contour line is thicker and labelled
+FEW_LEVELS = 12  # with at most so many levels all are labelled
 
 
 def surface_map(document):
@@ -19,7 +19,7 @@ def surface_map(document):
     drawn = figure(1.6 + 6 * min(1, size[1] / size[0]), 0.9 + 6 * min(1, size[0] / size[1]), document["title"])
     axes = drawn.subplots()
     near_is_bright = document["of"] in ("depth", "range")
-    hues = ListedColormap(colormaps["viridis"](np.linspace(0.25, 1, 256)))  # black lines are seen on all of them
+    hues = ListedColormap(colormaps["viridis"](np.linspace(0.25, 1, 256)))  # without the dark end, where black lines would not be visible
     colours = ScalarMappable(Normalize(document["lowest_m"], document["highest_m"]), hues.reversed() if near_is_bright else hues)
     light = 0.5 + 0.5 * image(document["shade"])[..., None] / 255
     rgb = np.where(np.isfinite(values)[..., None], colours.to_rgba(values)[..., :3] * light, 0.1)

@@ -12,12 +12,13 @@
 #include "estimator/view/measured_image.h"
 #include "plot/plot.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::test {
 namespace {
 
-const std::string kIss = NARPA_SOURCE_DIR "/../shared/assets/spacecraft/iss/iss.obj";
+const std::string kIss = test::source_path("../shared/assets/spacecraft/iss/iss.obj");
 
 Result<std::unique_ptr<World>> small_world(const std::string& path, int factor) {
     auto scene = read_scene(path);
@@ -34,7 +35,7 @@ Result<std::vector<ApproachRun>> run(const World& world, const ApproachOptions& 
 }
 
 TEST(BenchApproach, FindsTheDockingStationAtAllRanges) {
-    const auto world = small_world(NARPA_BUILD_DIR "/scenes/docking/docking.toml", 2);
+    const auto world = small_world(test::build_path("scenes/docking/docking.toml"), 2);
     ASSERT_TRUE(world) << world.error().text();
     ApproachOptions options;
     options.methods = {CameraMethod::features};

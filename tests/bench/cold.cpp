@@ -4,13 +4,14 @@
 #include <gtest/gtest.h>
 
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
 
 Result<std::vector<ColdTrial>> run(const ColdOptions& o, int first) {
     static TracingThreads threads(0);
-    static const Scene docking = *read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+    static const Scene docking = *read_scene(test::build_path("scenes/docking/docking.toml"));
     const StopFlag stop{};
     return run_cold(
         o, docking, first, threads, [](const ColdTrial&) {}, stop);

@@ -12,6 +12,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -188,7 +189,7 @@ TEST(Consistency, ATargetFromASceneFile) {
     ConsistencyOptions o;
     o.methods = {"icp"};
     o.conditions = {"plain"};
-    o.targets = {NARPA_BUILD_DIR "/scenes/docking/docking.toml"};
+    o.targets = {test::build_path("scenes/docking/docking.toml")};
     o.trials = 5;
     const auto rows = run(o, 0);
     ASSERT_EQ(rows.size(), 1);

@@ -8,6 +8,7 @@
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 constexpr std::size_t kStation = 0, kChaser = 1;
 
 Scene docking_scene() {
-    auto scene = read_scene(std::string(NARPA_BUILD_DIR) + "/scenes/docking/docking.toml");
+    auto scene = read_scene(test::build_path("scenes/docking/docking.toml"));
     EXPECT_TRUE(scene) << scene.error().text();
     return *std::move(scene);
 }

@@ -11,13 +11,14 @@
 #include "emulator/world.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
 
 /// A scene that ships, through its first camera, so many pixels a side.
 std::unique_ptr<World> shipped(const std::string& file, int size, RenderSettings::Method method) {
-    auto scene = read_scene(NARPA_BUILD_DIR "/scenes/" + file);
+    auto scene = read_scene(test::build_path("scenes/") + file);
     EXPECT_TRUE(scene) << scene.error().text();
     scene->render.method = method;
     Camera& c = scene->cameras[0];
@@ -124,7 +125,7 @@ TEST(BenchReference, ThePlainLoopConvergesToTheSameLampLight) {
 }
 
 TEST(BenchReference, TheLoopRejectsScenesItCannotRender) {
-    auto scene = read_scene(std::string(NARPA_BUILD_DIR) + "/scenes/docking/docking.toml");
+    auto scene = read_scene(test::build_path("scenes/docking/docking.toml"));
     ASSERT_TRUE(scene);
     const BodyPoses at(scene->bodies.size());
     const auto loop = reference_loop(*scene, at);

@@ -7,12 +7,13 @@
 #include "bench/stereo.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/support/image_files.h"
+#include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
 namespace {
 
-const std::string kDescent = std::string(NARPA_BUILD_DIR) + "/scenes/descent/descent.toml";
+const std::string kDescent = test::build_path("scenes/descent/descent.toml");
 
 void quietly(const std::string&) {}
 
@@ -144,7 +145,7 @@ Scene gale(const cv::Mat& height_mm, const Scene& like) {
 }
 
 TEST(StereoBench, ErrorsOnRealGroundAreAsPredicted) {
-    const std::string file = NARPA_SOURCE_DIR "/../shared/assets/dem/mars_gale/missionDEM_u16_mm.png";
+    const std::string file = test::source_path("../shared/assets/dem/mars_gale/missionDEM_u16_mm.png");
     if (!std::filesystem::exists(file))
         GTEST_SKIP() << "no elevation model beside the project: ../shared/assets/dem/mars_gale";
     const auto descent = read_scene(kDescent);

@@ -13,6 +13,7 @@
 #include "drivers/descriptor.h"
 #include "protocols/can/messages.h"
 #include "tests/drivers/can_support.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 
 namespace narpa {
@@ -33,7 +34,7 @@ Outcome finish(FILE* pipe, std::string out) {
 /// The client sends; every frame comes back to it with the lowest bit of its identifier turned over.
 Outcome serve_python(CanBus& bus, const std::string& arguments) {
     const std::string command =
-        "/usr/bin/python3 " NARPA_SOURCE_DIR "/tests/drivers/can_python_client.py " + arguments + " 2>&1";
+        "/usr/bin/python3 " + test::source_path("tests/drivers/can_python_client.py ") + arguments + " 2>&1";
     FILE* pipe = ::popen(command.c_str(), "r");
     if (pipe == nullptr) return {};
     const int fd = ::fileno(pipe);
@@ -72,7 +73,7 @@ TEST(PythonCan, SlcanOverTcp) {
 // The program that protocols/can/README.md offers, as it stands there but for the port.
 TEST(PythonCan, ReadmeProgramCommandsAPose) {
     if (std::system("/usr/bin/python3 -c 'import can, serial' 2>/dev/null") != 0) GTEST_SKIP() << "no python-can";
-    std::string text = test::read_text(NARPA_SOURCE_DIR "/protocols/can/README.md");
+    std::string text = test::read_text(test::source_path("protocols/can/README.md"));
     const std::string fence = "```python\n", port = "29537";
     const std::size_t begin = text.find(fence) + fence.size();
     text = text.substr(begin, text.find("```", begin) - begin);

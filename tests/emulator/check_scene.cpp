@@ -7,6 +7,7 @@
 #include "renderer/scene/scene_file.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
+#include "tests/support/paths.h"
 
 namespace narpa::test {
 namespace {
@@ -15,7 +16,7 @@ Done run_check(const std::string& arguments) {
     return run_command(std::string(kTimeLimit) + NARPA_BIN + " check " + arguments);
 }
 
-constexpr const char* kComplete = NARPA_SOURCE_DIR "/tests/data/scenes/complete.toml";
+const std::string kComplete = test::source_path("tests/data/scenes/complete.toml");
 
 TEST(UseMethod, RefusesWhatKeepsNoEnergyAndWarnsOfWhatIsDark) {
     Scene s;

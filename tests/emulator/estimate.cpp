@@ -14,13 +14,14 @@
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
+#include "tests/support/paths.h"
 
 namespace narpa::test {
 namespace {
 
 using nlohmann::json;
 
-constexpr const char* kDocking = NARPA_BUILD_DIR "/scenes/docking/docking.toml";
+const std::string kDocking = test::build_path("scenes/docking/docking.toml");
 
 /// The docking scene, small, over a second of its approach.
 class EstimateTest : public LoopTest {
@@ -37,7 +38,7 @@ protected:
     /// The approach's commands from 40 s on, a tenth of a second apart.
     static std::vector<PoseCommand> approach_commands(std::size_t count) {
         std::vector<PoseCommand> commands;
-        auto rows = read_trajectory(NARPA_BUILD_DIR "/scenes/docking/approach.csv");
+        auto rows = read_trajectory(test::build_path("scenes/docking/approach.csv"));
         EXPECT_TRUE(rows);
         for (const TrajectoryRow& row : *rows)
             if (row.t_ns % 100'000'000 == 0 && row.t_ns >= 40'000'000'000 && commands.size() < count)

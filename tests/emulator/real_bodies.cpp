@@ -8,6 +8,7 @@
 #include "emulator/camera_unit.h"
 #include "emulator/lidar_unit.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa {
@@ -26,7 +27,7 @@ class RealBodies : public ::testing::TestWithParam<RealBody> {};
 
 TEST_P(RealBodies, AreSeenByCameraAndLidar) {
     const RealBody& b = GetParam();
-    const std::string mesh = std::string(NARPA_SOURCE_DIR) + "/../shared/assets/" + b.mesh;
+    const std::string mesh = test::source_path("../shared/assets/") + b.mesh;
     if (!std::filesystem::exists(mesh)) GTEST_SKIP() << "no " << b.mesh << " beside the project";
     const test::TemporaryFolder folder;
     std::ofstream(folder / "scene.toml") << fmt::format(

@@ -15,6 +15,7 @@
 #include "estimator/features/feature_alignment.h"
 #include "estimator/view/frame_comparison.h"
 #include "tests/support/image_files.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -43,7 +44,7 @@ Mesh plate_model(const std::string& path) {
 class ErosFrame : public testing::Test {
 protected:
     void SetUp() override {
-        const std::string folder = NARPA_SOURCE_DIR "/../shared/assets";
+        const std::string folder = test::source_path("../shared/assets");
         std::ifstream description(folder + "/pose/near_msi_eros/pose.json");
         if (!description) GTEST_SKIP() << "needs ../shared/assets/pose/near_msi_eros and smallbody/eros";
         const auto j = nlohmann::json::parse(description);

@@ -12,11 +12,12 @@
 
 #include "base/pose.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
 
-const std::filesystem::path kScene = std::filesystem::path(NARPA_BUILD_DIR) / "scenes" / "docking";
+const std::filesystem::path kScene = std::filesystem::path(test::build_path("scenes/docking"));
 
 struct Row {
     double t_s = 0;

@@ -15,6 +15,7 @@
 
 #include "base/pose.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 
 namespace narpa {
@@ -22,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kDockingScene = fs::path(NARPA_BUILD_DIR) / "scenes" / "docking";
+const fs::path kDockingScene = std::filesystem::path(test::build_path("scenes/docking"));
 
 /// An OBJ file as written: corners by number of position, so that what meets in space meets here.
 struct ObjMesh {
@@ -157,7 +158,7 @@ TEST(DockingScene, ReadsWithoutAWarning) {
 TEST(DockingScene, GeneratorWritesTheSameBytesAgain) {
     const fs::path again = fs::path(testing::TempDir()) / "narpa_docking_again";
     fs::create_directories(again);
-    const std::string program = (fs::path(NARPA_BUILD_DIR) / "bin" / "make_scene").string();
+    const std::string program = (std::filesystem::path(test::build_path("bin/make_scene"))).string();
     // Another locale and another folder must change nothing.
     const std::string command = "LC_ALL=de_DE.UTF-8 '" + program + "' docking '" + again.string() + "' >/dev/null";
     ASSERT_EQ(std::system(command.c_str()), 0) << command;

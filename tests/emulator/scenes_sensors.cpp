@@ -9,6 +9,7 @@
 #include "renderer/film/camera_image.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 class DockingSensors : public testing::Test {
 protected:
     static void SetUpTestSuite() {
-        const auto path = std::filesystem::path(NARPA_BUILD_DIR) / "scenes" / "docking" / "docking.toml";
+        const auto path = std::filesystem::path(test::build_path("scenes/docking/docking.toml"));
         Result<Scene> read = read_scene(path.string());
         ASSERT_TRUE(read.has_value()) << read.error().text();
         scene = new Scene(std::move(*read));

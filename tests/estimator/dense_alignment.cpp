@@ -12,6 +12,7 @@
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -20,7 +21,7 @@ namespace {
 class DockingFrame : public testing::Test {
 protected:
     void SetUp() override {
-        auto read = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+        auto read = read_scene(test::build_path("scenes/docking/docking.toml"));
         ASSERT_TRUE(read) << read.error().text();
         scene = std::move(*read);
         camera = coarser_camera(scene.cameras[0], 4);

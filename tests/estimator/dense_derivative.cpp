@@ -14,6 +14,7 @@
 #include "estimator/dense/image_derivative.h"
 #include "estimator/view/model_view.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -227,7 +228,7 @@ TEST(ImageDerivative, OfAnEdgeAlongItself) {
 
 /// Textures, creases, shadows, parts before parts: ten metres before the port.
 TEST(ImageDerivative, OfTheDockingScene) {
-    const auto scene = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+    const auto scene = read_scene(test::build_path("scenes/docking/docking.toml"));
     ASSERT_TRUE(scene) << scene.error().text();
     const auto render_scene = RenderScene::create(*scene);
     ASSERT_TRUE(render_scene);
@@ -245,7 +246,7 @@ TEST(ImageDerivative, OfTheDockingScene) {
 
 /// Pixels that are not chosen are left out; the others do not depend on it.
 TEST(ImageDerivative, LooksAtTheChosenPixels) {
-    const auto scene = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+    const auto scene = read_scene(test::build_path("scenes/docking/docking.toml"));
     ASSERT_TRUE(scene) << scene.error().text();
     const auto render_scene = RenderScene::create(*scene);
     ASSERT_TRUE(render_scene);

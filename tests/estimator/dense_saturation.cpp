@@ -12,6 +12,7 @@
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -70,7 +71,7 @@ TEST(DenseSaturation, ACubeIsFoundByItsOutline) {
 }
 
 TEST(DenseSaturation, WhatClaimsToBeRightOnTheStationIsRight) {
-    auto station = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+    auto station = read_scene(test::build_path("scenes/docking/docking.toml"));
     ASSERT_TRUE(station) << station.error().text();
     const Claims c = claims(*station, test::square_camera(128), 30, 30, 6);
     EXPECT_GE(c.claimed, 3);

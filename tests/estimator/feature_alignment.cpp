@@ -8,6 +8,7 @@
 #include "estimator/features/feature_matcher.h"
 #include "renderer/camera/detector.h"
 #include "renderer/scene/scene_file.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -18,7 +19,7 @@ constexpr std::size_t kStation = 0, kChaser = 1;
 class FeatureAlignmentTest : public ::testing::Test {
 protected:
     void SetUp() override {
-        auto read = read_scene(NARPA_BUILD_DIR "/scenes/docking/docking.toml");
+        auto read = read_scene(test::build_path("scenes/docking/docking.toml"));
         ASSERT_TRUE(read) << read.error().text();
         scene_ = *std::move(read);
         auto made = RenderScene::create(scene_);

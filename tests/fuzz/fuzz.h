@@ -12,6 +12,8 @@
 #include <string>
 #include <string_view>
 
+#include "tests/support/paths.h"
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace narpa::fuzz {
@@ -69,7 +71,7 @@ public:
     /// Files of tests/data/scenes that seeds name.
     void copy_scene_data() const {
         for (const char* name : {"cube.obj", "cube.mtl", "checker.ppm", "normals.ppm", "stars.csv"})
-            std::filesystem::copy_file(std::string(NARPA_SOURCE_DIR "/tests/data/scenes/") + name, *this / name);
+            std::filesystem::copy_file(test::source_path("tests/data/scenes/") + name, *this / name);
     }
 
 private:

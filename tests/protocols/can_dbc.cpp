@@ -12,13 +12,14 @@
 
 #include "protocols/can/candump.h"
 #include "tests/protocols/can_support.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 
 namespace narpa {
 namespace {
 
 constexpr std::uint32_t kChaserBase = 0x100;
-const std::string kDbcPath = NARPA_SOURCE_DIR "/protocols/can/narpa.dbc";
+const std::string kDbcPath = test::source_path("protocols/can/narpa.dbc");
 
 std::string shipped_text() {
     return test::read_text(kDbcPath);
@@ -28,7 +29,7 @@ TEST(CanDbc, ShippedFileIsTheGeneratedOne) {
     const std::array<CanBody, 1> bodies{{{"chaser", kChaserBase}}};
     const std::string generated = write_dbc(bodies);
     if (generated == shipped_text()) return;
-    const std::string path = NARPA_BUILD_DIR "/narpa.dbc";
+    const std::string path = test::build_path("narpa.dbc");
     std::ofstream(path) << generated;
     ADD_FAILURE() << kDbcPath << " differs from what signals.h says; the new text is in " << path;
 }
@@ -48,7 +49,7 @@ struct Python {
 };
 Python run_reader(const std::string& arguments) {
     Python python;
-    const std::string command = "/usr/bin/python3 " NARPA_SOURCE_DIR "/tests/protocols/can_dbc_reader.py " +
+    const std::string command = "/usr/bin/python3 " + test::source_path("tests/protocols/can_dbc_reader.py ") +
                                 kDbcPath + " " + arguments + " 2>&1";
     FILE* pipe = ::popen(command.c_str(), "r");
     if (pipe == nullptr) return python;

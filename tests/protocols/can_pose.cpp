@@ -9,6 +9,7 @@
 #include "protocols/can/candump.h"
 #include "protocols/can/crc.h"
 #include "tests/protocols/can_support.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -484,7 +485,7 @@ TEST(CanPose, UnwrapsToTheNearestTurn) {
 
 // The frames that the README shows are the ones that narpa sends, with the values that it states.
 TEST(CanPose, WorkedExampleOfTheReadme) {
-    std::ifstream readme(NARPA_SOURCE_DIR "/protocols/can/README.md");
+    std::ifstream readme(test::source_path("protocols/can/README.md"));
     std::vector<CanFrame> frames;
     for (std::string text; std::getline(readme, text);)
         if (CandumpLine line; parse_candump(text, line) == nullptr && !line.frame.error)

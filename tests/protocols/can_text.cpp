@@ -11,6 +11,7 @@
 #include "protocols/can/slcan.h"
 #include "protocols/can/udp_multicast.h"
 #include "tests/support/can_frames.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 
 namespace narpa {
@@ -235,7 +236,7 @@ TEST(CanCandump, StatesHowManyFramesAreNotInTheLogAsTheReadmeShows) {
     const std::size_t n = format_candump({12'100'000'000, lost_frames(77'411)}, "not_logged", out);
     const std::string line(out.data(), n);
     EXPECT_EQ(line, "(0000000012.100000) not_logged 20000004#00010000632E0100\n");
-    EXPECT_NE(test::read_text(NARPA_SOURCE_DIR "/protocols/can/README.md").find(line), std::string::npos);
+    EXPECT_NE(test::read_text(test::source_path("protocols/can/README.md")).find(line), std::string::npos);
 }
 
 TEST(CanCandump, ReadsWhatOthersWrite) {

@@ -10,6 +10,7 @@
 
 #include "protocols/lidar/ouster_metadata.h"
 #include "protocols/lidar/ouster_packet.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 
 namespace narpa {
@@ -32,7 +33,7 @@ std::shared_ptr<const LidarModel> os1_unit(int beams, int columns, double rate_h
 }
 
 std::string recorded_metadata(const char* file) {
-    return test::read_text(std::string(NARPA_SOURCE_DIR "/../shared/assets/lidar/ouster/") + file);
+    return test::read_text(test::source_path("../shared/assets/lidar/ouster/") + file);
 }
 
 TEST(Os1, HasItsModesInWholePackets) {

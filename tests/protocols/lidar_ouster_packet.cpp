@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/protocols/capture.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -101,8 +102,8 @@ class OusterRecording : public ::testing::TestWithParam<Recording> {};
 TEST_P(OusterRecording, IsReadAndWrittenByteForByte) {
     const Recording& r = GetParam();
     const OusterFormat format(r.profile, r.beams);
-    const auto packets = test::captured_payloads(
-        std::string(NARPA_SOURCE_DIR "/../shared/assets/lidar/ouster/") + r.file, format.bytes());
+    const auto packets =
+        test::captured_payloads(test::source_path("../shared/assets/lidar/ouster/") + r.file, format.bytes());
     if (packets.empty()) GTEST_SKIP() << "no capture beside the project: ../shared/assets/lidar/ouster";
     ASSERT_EQ(packets.size(), r.packets);
     std::size_t returns = 0;

@@ -15,6 +15,7 @@
 #include "protocols/lidar/velodyne_packet.h"
 #include "protocols/little_endian.h"
 #include "tests/protocols/capture.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -139,7 +140,7 @@ TEST(Velodyne, UnitsHaveTheirOwnBeams) {
 
 TEST(Hdl32e, PacketsOfARealUnitAreReadAndWrittenByteForByte) {
     const auto packets = test::captured_payloads(
-        NARPA_SOURCE_DIR "/../shared/assets/lidar/velodyne/sample_velodyne_hdl32.pcap", VelodynePacket::kBytes);
+        test::source_path("../shared/assets/lidar/velodyne/sample_velodyne_hdl32.pcap"), VelodynePacket::kBytes);
     if (packets.empty()) GTEST_SKIP() << "no capture beside the project: ../shared/assets/lidar/velodyne";
     const auto unit = hdl32e().configure_default();
     std::size_t points = 0;

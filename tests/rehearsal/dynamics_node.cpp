@@ -14,6 +14,7 @@
 #include "tests/drivers/can_support.h"
 #include "tests/rehearsal/dynamics_support.h"
 #include "tests/support/command.h"
+#include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::rehearsal {
@@ -489,10 +490,10 @@ TEST(DynamicsOnUdp, TheSameRunInCanFd) {
         EXPECT_EQ(fd.poses[i].command.motion.T_world_body, classic.poses[i].command.motion.T_world_body);
 }
 
-constexpr const char* kProgram = NARPA_BUILD_DIR "/bin/narpa-dynamics ";
+const std::string kProgram = test::build_path("bin/narpa-dynamics ");
 
 TEST(DynamicsProgram, UsesTheCommonExitStatuses) {
-    const std::string scenario = NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml";
+    const std::string scenario = test::build_path("scenes/rehearsal/docking.toml");
     const auto status = [](const std::string& arguments) {
         return test::run_command(kProgram + arguments + " 2>&1");
     };

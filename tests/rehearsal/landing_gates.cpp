@@ -5,13 +5,14 @@
 
 #include "estimator/pose/pose_estimate.h"
 #include "tests/rehearsal/judge_support.h"
+#include "tests/support/paths.h"
 
 namespace narpa::rehearsal {
 namespace {
 
 /// On the ground of the shipped scene; the site is clear and nearly flat.
 Scenario to_land() {
-    auto read = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/landing.toml");
+    auto read = read_scenario(test::build_path("scenes/rehearsal/landing.toml"));
     EXPECT_TRUE(read) << read.error().text();
     Scenario s = *std::move(read);
     s.gates = {};

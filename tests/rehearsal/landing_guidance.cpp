@@ -6,6 +6,7 @@
 
 #include "base/constants.h"
 #include "rehearsal/navigation/flight_control.h"
+#include "tests/support/paths.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -33,7 +34,7 @@ TEST(DescentPath, JoinsBothStatesAndEndsWithoutAcceleration) {
 }
 
 Scenario landing() {
-    auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/landing.toml");
+    auto s = read_scenario(test::build_path("scenes/rehearsal/landing.toml"));
     EXPECT_TRUE(s) << s.error().text();
     return *std::move(s);
 }

@@ -4,12 +4,13 @@
 #include <fstream>
 
 #include "rehearsal/scenario/scenario.h"
+#include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::rehearsal {
 namespace {
 
-const std::string kLandings = NARPA_BUILD_DIR "/scenes/rehearsal/";
+const std::string kLandings = test::build_path("scenes/rehearsal/");
 
 TEST(LandingScenario, ReadsTheLanding) {
     const auto s = read_scenario(kLandings + "landing.toml");

@@ -5,6 +5,7 @@
 #include "rehearsal/navigation/measurements.h"
 #include "rehearsal/navigation/sensor_inputs.h"
 #include "tests/rehearsal/simulated_sensors.h"
+#include "tests/support/paths.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -17,7 +18,7 @@ struct Stage {
 /// The scene is read once.
 Stage& stage() {
     static Stage s = [] {
-        auto scenario = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
+        auto scenario = read_scenario(test::build_path("scenes/rehearsal/docking.toml"));
         EXPECT_TRUE(scenario) << scenario.error().text();
         auto model = SceneModel::create(*scenario);
         EXPECT_TRUE(model) << model.error().text();

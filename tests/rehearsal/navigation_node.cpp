@@ -15,12 +15,13 @@
 #include "tests/drivers/can_support.h"
 #include "tests/rehearsal/simulated_sensors.h"
 #include "tests/support/command.h"
+#include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::rehearsal {
 namespace {
 
-const std::string kScenario = NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml";
+const std::string kScenario = test::build_path("scenes/rehearsal/docking.toml");
 
 /// The docking that comes with narpa, by camera alone.
 Scenario by_camera_alone() {
@@ -193,7 +194,7 @@ TEST(NavigationNode, NamesWhatIsWrongWithItsSources) {
 
 TEST(NavigationProgram, EndsWithTheStatusOfWhatIsWrong) {
     const auto status = [](const std::string& arguments) {
-        return narpa::test::run_command(NARPA_BUILD_DIR "/bin/narpa-navigation " + arguments + " 2>&1").status;
+        return narpa::test::run_command(test::build_path("bin/narpa-navigation ") + arguments + " 2>&1").status;
     };
     EXPECT_EQ(status("--help"), 0);
     EXPECT_EQ(status("none.toml --can slcan:1"), 2);

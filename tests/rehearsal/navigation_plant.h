@@ -7,13 +7,14 @@
 #include <Eigen/LU>
 
 #include "rehearsal/navigation/flight_control.h"
+#include "tests/support/paths.h"
 
 namespace narpa::rehearsal {
 
 /// The docking that comes with narpa; read once.
 inline const Scenario& docking_scenario() {
     static const Scenario scenario = [] {
-        auto s = read_scenario(NARPA_BUILD_DIR "/scenes/rehearsal/docking.toml");
+        auto s = read_scenario(test::build_path("scenes/rehearsal/docking.toml"));
         EXPECT_TRUE(s) << s.error().text();
         return *std::move(s);
     }();

@@ -15,6 +15,7 @@
 #include "rehearsal/runner/run_folder.h"
 #include "tests/rehearsal/judge_support.h"
 #include "tests/rehearsal/markup.h"
+#include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::rehearsal {
@@ -25,8 +26,8 @@ namespace fs = std::filesystem;
 /// The docking that comes with narpa, for a second.
 std::string short_scenario(const test::TemporaryFolder& folder) {
     std::ofstream(folder / "short.toml")
-        << "[scenario]\nbased_on = \"" NARPA_BUILD_DIR
-           "/scenes/rehearsal/docking.toml\"\nname = \"short\"\nduration_s = 1.0\n";
+        << "[scenario]\nbased_on = \"" << test::build_path("scenes/rehearsal/docking.toml")
+        << "\"\nname = \"short\"\nduration_s = 1.0\n";
     return folder / "short.toml";
 }
 
@@ -34,7 +35,7 @@ RehearsalOptions options(const test::TemporaryFolder& folder) {
     RehearsalOptions o;
     o.scenario = short_scenario(folder);
     o.folder = folder / "run";
-    o.programs = NARPA_BUILD_DIR "/bin";
+    o.programs = test::build_path("bin");
     o.threads = 1;
     o.version = "test";
     return o;
@@ -189,7 +190,7 @@ TEST_F(Whole, WaitsForANavigationStartedByTheUser) {
     };
     console.navigation_ready = [&] {
         if (++asked < 20) return false;
-        own = ::popen((NARPA_BUILD_DIR "/bin/narpa-navigation " + value("SCENARIO") + " --can " + value("BUS") +
+        own = ::popen((test::build_path("bin/narpa-navigation ") + value("SCENARIO") + " --can " + value("BUS") +
                        " --video " + value("VIDEO") + " --lidar " + value("LIDAR") + " --lockstep")
                           .c_str(),
                       "r");
@@ -221,7 +222,7 @@ TEST_F(Whole, AReplayNeverRunsACommandOfTheLog) {
                                 {"seed", 1u},
                                 {"dynamics", ""},
                                 {"navigation", ""}};
-    RerunOptions log{folder / "log", "", "", 1, "test", NARPA_BUILD_DIR "/bin"};
+    RerunOptions log{folder / "log", "", "", 1, "test", test::build_path("bin")};
     fs::create_directories(log.folder);
     for (const char* program : {"dynamics", "navigation"})
         for (const std::string& command : {"touch " + proof, "\x1b[2Jnone; touch " + proof}) {

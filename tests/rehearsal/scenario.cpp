@@ -5,13 +5,14 @@
 
 #include <fstream>
 
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace narpa::rehearsal {
 namespace {
 
-const std::string kScenarios = NARPA_BUILD_DIR "/scenes/rehearsal/";
+const std::string kScenarios = test::build_path("scenes/rehearsal/");
 
 TEST(Orbit, LvlhRotatesAboutTheMomentum) {
     const Orbit orbit;
@@ -55,7 +56,7 @@ TEST(Scenario, ReadsTheDocking) {
     EXPECT_EQ(s->chaser.inertia_kg_m2(1, 1), 31000);
 }
 
-/// Against the flights of docs/rehearsal.md, Measured.
+/// Against the flights of docs/rehearsal.md, "Measured results".
 TEST(Scenario, NominalDurationIsThatOfAFlight) {
     for (const auto& [name, flown_s] : {std::pair{"docking", 209.5}, {"dispersions", 98.1}}) {
         const auto s = read_scenario(kScenarios + name + ".toml");

@@ -9,6 +9,7 @@
 #include "base/constants.h"
 #include "renderer/light/analytic_sky.h"
 #include "tests/renderer/path_support.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -17,7 +18,7 @@ using namespace narpa::test;
 
 TEST(HosekWilkie, IsThePublishedModelToSinglePrecision) {
     // Made with the authors' program, version 1.4a, as in the source of Debian's blender 3.4.1.
-    std::ifstream file(NARPA_SOURCE_DIR "/tests/data/hosek_wilkie.csv");
+    std::ifstream file(test::source_path("tests/data/hosek_wilkie.csv"));
     std::string line;
     std::getline(file, line);
     int cases = 0;

@@ -13,6 +13,7 @@
 
 #include "renderer/camera/detector.h"
 #include "tests/support/image_files.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 #include "tests/support/shapes.h"
 
@@ -22,7 +23,7 @@ namespace {
 using namespace test;
 
 std::string scratch(const std::string& name) {
-    const auto folder = std::filesystem::path(NARPA_BUILD_DIR) / "image_file_test";
+    const auto folder = std::filesystem::path(test::build_path("image_file_test"));
     std::filesystem::create_directories(folder);
     return (folder / name).string();
 }

@@ -5,6 +5,7 @@
 
 #include "renderer/scene/mesh_file.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -14,7 +15,7 @@ using test::MemoryFolder;
 const std::string kAdvice = "; the file is damaged or too large, expected it exported anew, or as OBJ";
 
 std::string corpus_file(const std::string& name) {
-    return NARPA_SOURCE_DIR "/tests/fuzz/corpus/mesh/" + name;
+    return test::source_path("tests/fuzz/corpus/mesh/") + name;
 }
 
 std::string error_of(const std::string& path, const MeshReaderLimits& limits = {}) {

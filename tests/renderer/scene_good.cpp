@@ -6,6 +6,7 @@
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -36,7 +37,7 @@ constexpr const char* kSphere = "[[body]]\nname = \"ball\"\nsphere = {radius_m =
 constexpr const char* kCamera = "[[camera]]\nname = \"c\"\nresolution = [640, 480]\nfov_horizontal_deg = 90\n";
 
 TEST(SceneFile, ManualShowsTheCompleteScene) {
-    const std::string manual = test::read_text(NARPA_SOURCE_DIR "/docs/scene.md");
+    const std::string manual = test::read_text(test::source_path("docs/scene.md"));
     const std::size_t from = manual.rfind("```toml\n") + 8;
     ASSERT_LT(from, manual.size());
     EXPECT_EQ(manual.substr(from, manual.find("```", from) - from), test::read_text(data_file("complete.toml")));

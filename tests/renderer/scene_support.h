@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/result.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -41,12 +42,12 @@ private:
 };
 
 inline std::string data_file(const std::string& name) {
-    return NARPA_SOURCE_DIR "/tests/data/scenes/" + name;
+    return test::source_path("tests/data/scenes/") + name;
 }
 
 /// A file of the folder of real meshes beside the project, which not every checkout has.
 inline std::string asset_file(const std::string& name) {
-    return NARPA_SOURCE_DIR "/../shared/assets/" + name;
+    return test::source_path("../shared/assets/") + name;
 }
 
 }  // namespace narpa::test

@@ -9,6 +9,7 @@
 #include "base/constants.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/paths.h"
 
 namespace narpa {
 namespace {
@@ -122,7 +123,7 @@ TEST(StarsOfAScene, ErrorsNameTheLineOfTheCatalogue) {
 
 /// The set that ships: angles between stars as every star atlas has them, degrees.
 TEST(BrightestStars, FormTheirConstellations) {
-    const auto stars = read_star_catalogue(NARPA_SOURCE_DIR "/scenes/stars/brightest.csv");
+    const auto stars = read_star_catalogue(test::source_path("scenes/stars/brightest.csv"));
     ASSERT_TRUE(stars) << stars.error().text();
     EXPECT_GT(stars->size(), 100u);
     const auto named = [&](std::string_view name) {
@@ -141,7 +142,7 @@ TEST(BrightestStars, FormTheirConstellations) {
 TEST(BrightestStars, StandWhereHipparcosFoundThem) {
     const std::string file = asset_file("stars/stars.json");
     NARPA_SKIP_WITHOUT(file);
-    const auto stars = read_star_catalogue(NARPA_SOURCE_DIR "/scenes/stars/brightest.csv");
+    const auto stars = read_star_catalogue(test::source_path("scenes/stars/brightest.csv"));
     ASSERT_TRUE(stars);
     std::ifstream in(file);
     const nlohmann::json hipparcos = nlohmann::json::parse(in);

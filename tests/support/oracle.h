@@ -6,10 +6,12 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "tests/support/paths.h"
+
 namespace narpa::test {
 
 inline nlohmann::json oracle(const std::string& name) {
-    std::ifstream file(std::string(NARPA_SOURCE_DIR) + "/../shared/oracles/" + name + ".json");
+    std::ifstream file(test::source_path("../shared/oracles/") + name + ".json");
     return file ? nlohmann::json::parse(file) : nlohmann::json();
 }
 

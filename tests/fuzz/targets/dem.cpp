@@ -5,12 +5,13 @@
 
 #include "renderer/scene/dem_process.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/support/paths.h"
 
 namespace {
 
 using namespace narpa;
 
-constexpr const char* kData = NARPA_SOURCE_DIR "/tests/data/dem/";
+const std::string kData = test::source_path("tests/data/dem/");
 constexpr std::array<const char*, 3> kSidecars{"mars.tif.msk", "mars.tif.ovr", "mars.tfw"};
 
 /// Writes the input where the reader will find it; the file to read.

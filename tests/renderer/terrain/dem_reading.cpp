@@ -12,6 +12,7 @@
 #include "renderer/geometry/tracer.h"
 #include "renderer/scene/scene_file.h"
 #include "tests/renderer/scene_support.h"
+#include "tests/support/paths.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -20,7 +21,7 @@ namespace {
 using test::MemoryFolder;
 
 std::string dem_file(const std::string& name) {
-    return NARPA_SOURCE_DIR "/tests/data/dem/" + name;
+    return test::source_path("tests/data/dem/") + name;
 }
 
 /// The heights of tests/data/dem.
@@ -117,7 +118,7 @@ TEST(Dem, StandsOnTheEllipsoidOfItsMap) {
 
 TEST(Dem, AWholePlanetFromAMapOfIt) {
     NEEDS_GDAL();
-    const std::string path = NARPA_SOURCE_DIR "/../shared/assets/dem/moon_lola/LDEM_4.LBL";
+    const std::string path = test::source_path("../shared/assets/dem/moon_lola/LDEM_4.LBL");
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "needs ../shared/assets/dem/moon_lola";
     DemRequest r = request_of(path);
     r.on = DemRequest::On::ellipsoid;
@@ -179,7 +180,7 @@ TEST(Dem, ErrorsSayWhatToDo) {
     png.post_spacing_m = 1, png.on = DemRequest::On::tangent;
     EXPECT_NE(error_of(png).find("it names no ellipsoid"), std::string::npos);
     EXPECT_NE(
-        error_of(request_of(NARPA_SOURCE_DIR "/README.md")).find("not a DEM that can be read, expected GeoTIFF"),
+        error_of(request_of(test::source_path("README.md"))).find("not a DEM that can be read, expected GeoTIFF"),
         std::string::npos);
     DemRequest small = request_of(dem_file("mars.tif"));
     small.options.budget_bytes = 100;

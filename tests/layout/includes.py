@@ -1,7 +1,7 @@
 """Checks that every #include in a library refers to the library itself or to a library that it links, and that x.cpp
 includes x.h first, so that x.h compiles alone.
 
-Usage: includes.py LIBRARIES SOURCE_DIR    LIBRARIES: lines of "folder: linked linked ..."
+Usage: includes.py LINKS SOURCE_DIR    LINKS: lines of "folder: linked linked ..."
 """
 import pathlib
 import re

@@ -21,7 +21,7 @@ nlohmann::json air_rows(const std::vector<AirErrorRow>& rows, const char* settin
     for (const AirErrorRow& r : rows)
         out.push_back({{setting, r.setting},
                        {"error", r.rms},
-                       {"error_max", r.most},
+                       {"error_most", r.most},
                        {"time_s", r.time_s},
                        {"bytes", r.bytes},
                        {"default", r.is_default}});

@@ -148,7 +148,7 @@ nlohmann::json to_json(const EstimateSummary& s) {
             {"rotation_of_bound", s.rotation_of_bound},
             {"position_of_bound", s.position_of_bound},
             {"ms_median", s.ms_median},
-            {"ms_max", s.ms_max}};
+            {"ms_most", s.ms_max}};
 }
 
 std::string to_text(const EstimateSummary& s) {

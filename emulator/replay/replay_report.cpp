@@ -132,7 +132,7 @@ json to_json(const BudgetCost& c) {
         {"reference_error", c.reference_error},
         {"predicted_over_measured", c.predicted_over_measured ? json(*c.predicted_over_measured) : json(nullptr)},
         {"ssim_mean", c.ssim_mean},
-        {"ssim_min", c.ssim_min},
+        {"ssim_least", c.ssim_min},
         {"edges", to_json(c.edges)},
         {"bodies",
          {{"centroids", c.bodies},

@@ -36,7 +36,7 @@ constexpr std::uint64_t kPixelsOfACoarseRay = 4;
 /// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate.
 constexpr double kSunlightPart = 0.22;
 constexpr double kRaysForSunlight = 20, kSamplesForSunlight = 6;
-constexpr double kMaxlySeparate = 0.5;
+constexpr double kMostlySeparate = 0.5;
 constexpr double kMaxRaysOfSunlight = 2;  ///< per sample: the camera's and the Sun's
 /// A remainder below this fraction of the budget is not worth another pass.
 constexpr double kRest = 0.05;
@@ -169,7 +169,7 @@ private:
         if (which == Tiles::all) costs_.note(Of::samples, pass.samples, pass.wall_ns);
         if (!book(pass, l, which != Tiles::the_others)) return false;
         each_ = rays_each(pass);
-        mostly_separate_ = static_cast<double>(pass.separate) > kMaxlySeparate * static_cast<double>(pass.met);
+        mostly_separate_ = static_cast<double>(pass.separate) > kMostlySeparate * static_cast<double>(pass.met);
         if (which == Tiles::a_sixteenth) return true;
         account_.step = FrameStep::one_sample;
         to_show_ = ToShow::means;

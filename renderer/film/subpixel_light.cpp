@@ -31,9 +31,9 @@ DiscPoint lattice_point(std::uint32_t i, std::uint32_t n) {
 /// The part of the disc that the Sun can light gets half of the samples, however thin its crescent; the rest gets
 /// the other half. Each part is the disc, compressed along x.
 DiscPoint disc_point(double lit, std::uint32_t s, std::uint32_t samples) {
-    constexpr double kMaxlyLit = 0.75;
+    constexpr double kMostlyLit = 0.75;
     const std::uint32_t half = samples / 2;
-    if (lit > kMaxlyLit) return lattice_point(s, samples);
+    if (lit > kMostlyLit) return lattice_point(s, samples);
     const auto [a, y, area] = lattice_point(s % half, half);
     const double half_chord = std::sqrt(std::max(0.0, 1 - y * y));
     if (s < half) return {lit * a + (1 - lit) * half_chord, y, lit * area};

@@ -7,8 +7,8 @@
 
 #include "base/write_file.h"
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/assets/calibration_file.h"
 #include "renderer/camera/scene_camera.h"
-#include "renderer/scene/calibration_file.h"
 
 namespace narpa::cli {
 namespace {

@@ -28,7 +28,7 @@
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
 #include "renderer/camera/scene_camera.h"
-#include "renderer/scene/kind_names.h"
+#include "renderer/scene_file/kind_names.h"
 
 namespace narpa::cli {
 namespace {

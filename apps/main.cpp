@@ -13,7 +13,7 @@
 #include "base/each_isa.h"
 #include "base/lanes.h"
 #include "generated/commit.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::cli {
 

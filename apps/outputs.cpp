@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "renderer/scene/scene_inputs.h"
+#include "renderer/scene_file/scene_inputs.h"
 
 namespace narpa::cli {
 namespace {

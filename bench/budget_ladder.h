@@ -15,7 +15,7 @@
 #include "bench/reference_loop.h"
 #include "emulator/threads.h"
 #include "emulator/world.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "estimator/view/measured_image.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa {
 namespace {

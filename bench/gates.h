@@ -9,7 +9,7 @@
 #include "bench/raw_embree.h"
 #include "emulator/threads.h"
 #include "emulator/world.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

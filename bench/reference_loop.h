@@ -10,7 +10,7 @@
 #include <functional>
 
 #include "base/result.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

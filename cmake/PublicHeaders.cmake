@@ -5,7 +5,7 @@ set(NARPA_PUBLIC_HEADERS
   protocols/lidar/lidar_model.h protocols/lidar/pattern_lidar.h protocols/lidar/velodyne.h protocols/video/embedded_line.h protocols/video/y4m.h
   drivers/can/can_bus.h drivers/lidar/packet_sink.h drivers/lidar/packet_source.h drivers/video/video_sink.h
   drivers/video/video_source.h
-  renderer/scene/scene.h renderer/scene/scene_file.h renderer/geometry/tracer.h renderer/film/camera_image.h
+  renderer/scene/scene.h renderer/scene_file/scene_file.h renderer/geometry/tracer.h renderer/frame/camera_image.h
   renderer/camera/detector.h renderer/lidar/lidar_shot.h renderer/image/image_file.h
   estimator/pose/pose_estimate.h estimator/filter/pose_filter.h
   emulator/emulator.h emulator/world.h

@@ -12,7 +12,7 @@
 #include "emulator/world.h"
 #include "protocols/ledger.h"
 #include "renderer/camera/sensor_array.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

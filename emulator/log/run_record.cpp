@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/file_bytes.h"
 #include "base/write_file.h"
-#include "renderer/scene/file_bytes.h"
 
 namespace narpa {
 namespace {

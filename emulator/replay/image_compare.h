@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

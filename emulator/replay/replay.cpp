@@ -10,7 +10,7 @@
 #include "protocols/video/embedded_line.h"
 #include "renderer/camera/detector.h"
 #include "renderer/camera/read_out.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa {
 namespace {

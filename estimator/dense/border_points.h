@@ -8,8 +8,8 @@
 
 #include "estimator/dense/surface_edges.h"
 #include "estimator/view/measured_image.h"
-#include "renderer/film/camera_batch.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_batch.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

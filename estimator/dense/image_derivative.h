@@ -31,7 +31,7 @@
 #include "estimator/view/measured_image.h"
 #include "estimator/view/row_times.h"
 #include "renderer/camera/image_optics.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

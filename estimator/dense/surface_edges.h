@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "renderer/film/camera_batch.h"
+#include "renderer/frame/camera_batch.h"
 
 namespace narpa {
 

@@ -10,7 +10,7 @@
 
 #include "estimator/pose/pnp_points.h"
 #include "estimator/view/measured_image.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

@@ -9,7 +9,7 @@
 
 #include "estimator/view/row_times.h"
 #include "renderer/camera/scene_camera.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 
 namespace narpa {
 

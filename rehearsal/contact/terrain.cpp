@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "rehearsal/scenario/scenario.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::rehearsal {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <variant>
 
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::rehearsal {
 namespace {

@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "base/write_file.h"
-#include "renderer/scene/based_on.h"
+#include "renderer/keys/based_on.h"
 
 namespace narpa::rehearsal {
 namespace {

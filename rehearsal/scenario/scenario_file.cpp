@@ -7,10 +7,10 @@
 
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario_tables.h"
-#include "renderer/scene/based_on.h"
-#include "renderer/scene/scene_file.h"
-#include "renderer/scene/scene_parts.h"
-#include "renderer/scene/toml_reader.h"
+#include "renderer/keys/based_on.h"
+#include "renderer/keys/toml_reader.h"
+#include "renderer/scene_file/scene_file.h"
+#include "renderer/scene_file/scene_parts.h"
 
 namespace narpa::rehearsal {
 namespace {

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "rehearsal/scenario/scenario.h"
-#include "renderer/scene/toml_reader.h"
+#include "renderer/keys/toml_reader.h"
 
 namespace narpa::rehearsal {
 

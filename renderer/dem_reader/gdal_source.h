@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "renderer/scene/dem_process.h"
+#include "renderer/assets/dem_process.h"
 
 namespace narpa {
 

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <memory>
 
+#include "renderer/assets/confined_reader.h"
+#include "renderer/assets/dem_message.h"
 #include "renderer/dem_reader/gdal_source.h"
-#include "renderer/scene/confined_reader.h"
-#include "renderer/scene/dem_message.h"
 
 namespace {
 

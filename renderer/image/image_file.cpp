@@ -19,9 +19,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "renderer/scene/file_bytes.h"
-#include "renderer/scene/image_codecs.h"
-#include "renderer/scene/image_header.h"
+#include "base/file_bytes.h"
+#include "renderer/assets/image_codecs.h"
+#include "renderer/assets/image_header.h"
 
 namespace narpa {
 namespace {

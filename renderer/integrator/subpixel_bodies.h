@@ -3,7 +3,7 @@
 ///
 /// A sphere of 10 m at 100 km covers 0.014 of a pixel: 64 random samples estimate its light with 107 % noise. Such
 /// a body is excluded from the camera's regular rays and sampled by separate rays over its own outline:
-/// renderer/film/subpixel_light.h.
+/// renderer/frame/subpixel_light.h.
 #pragma once
 
 #include <optional>

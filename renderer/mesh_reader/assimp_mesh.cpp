@@ -8,8 +8,8 @@
 #include <iterator>
 #include <sstream>
 
+#include "base/file_bytes.h"
 #include "renderer/mesh_reader/assimp_reader.h"
-#include "renderer/scene/file_bytes.h"
 
 namespace narpa {
 

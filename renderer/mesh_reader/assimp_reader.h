@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "renderer/scene/mesh_message.h"
+#include "renderer/assets/mesh_message.h"
 
 struct aiMaterial;
 struct aiScene;

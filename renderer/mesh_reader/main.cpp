@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "renderer/assets/confined_reader.h"
 #include "renderer/mesh_reader/assimp_reader.h"
-#include "renderer/scene/confined_reader.h"
 
 int main(int argc, char** argv) {
     if (argc != 4) {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "base/file_bytes.h"
+#include "renderer/assets/text_cursor.h"
 #include "renderer/mesh_reader/assimp_reader.h"
-#include "renderer/scene/file_bytes.h"
-#include "renderer/scene/text_cursor.h"
 
 namespace narpa {
 namespace {

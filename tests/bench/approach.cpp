@@ -11,7 +11,7 @@
 
 #include "estimator/view/measured_image.h"
 #include "plot/plot.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

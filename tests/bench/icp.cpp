@@ -7,7 +7,7 @@
 #include "emulator/lidar_unit.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

@@ -10,7 +10,7 @@
 #include "bench/reference_loop.h"
 #include "emulator/world.h"
 #include "renderer/camera/scene_camera.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

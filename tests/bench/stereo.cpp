@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "bench/stereo.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/image_files.h"
 #include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
 #include "tests/support/paths.h"

@@ -14,7 +14,7 @@
 #include "emulator/emulator.h"
 #include "emulator/lidar_sensor.h"
 #include "protocols/can/messages.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 

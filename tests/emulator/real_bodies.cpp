@@ -7,7 +7,7 @@
 
 #include "emulator/camera_unit.h"
 #include "emulator/lidar_unit.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/pose.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

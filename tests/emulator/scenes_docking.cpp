@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "base/pose.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 

@@ -6,9 +6,9 @@
 #include <filesystem>
 
 #include "base/constants.h"
-#include "renderer/film/camera_image.h"
+#include "renderer/frame/camera_image.h"
 #include "renderer/lidar/lidar_shot.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

@@ -13,7 +13,7 @@
 #include "../support/shapes.h"
 #include "estimator/dense/image_derivative.h"
 #include "estimator/view/model_view.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

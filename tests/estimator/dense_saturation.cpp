@@ -11,7 +11,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

@@ -7,7 +7,7 @@
 #include "estimator/features/feature_alignment.h"
 #include "estimator/features/feature_matcher.h"
 #include "renderer/camera/detector.h"
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 
 namespace narpa {

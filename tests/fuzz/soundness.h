@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/scene/mesh_file.h"
+#include "renderer/assets/mesh_file.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace narpa::fuzz {

@@ -1,6 +1,6 @@
 // A camera's or a LiDAR's calibration in YAML.
-#include "renderer/scene/calibration_file.h"
-#include "renderer/scene/lidar_calibration.h"
+#include "renderer/assets/calibration_file.h"
+#include "renderer/assets/lidar_calibration.h"
 #include "tests/fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

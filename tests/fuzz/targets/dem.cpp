@@ -3,7 +3,7 @@
 // lines are its world file.
 #include <array>
 
-#include "renderer/scene/dem_process.h"
+#include "renderer/assets/dem_process.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/support/paths.h"
 

@@ -1,5 +1,5 @@
 // A scene file, beside the meshes and images that the tests' complete scene names.
-#include "renderer/scene/scene_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/fuzz/soundness.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,5 +1,5 @@
 // A star catalogue (CSV).
-#include "renderer/scene/star_catalogue.h"
+#include "renderer/assets/star_catalogue.h"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // DEM files, each format the same 40 x 30 posts: heights, places, holes; scenes with a dem; damaged files.
-#include "renderer/scene/dem_process.h"
+#include "renderer/assets/dem_process.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 #include "base/constants.h"
 #include "base/program_beside.h"
 #include "renderer/geometry/tracer.h"
-#include "renderer/scene/scene_file.h"
-#include "tests/renderer/scene_support.h"
+#include "renderer/scene_file/scene_file.h"
+#include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/paths.h"
 #include "tests/support/shapes.h"
 

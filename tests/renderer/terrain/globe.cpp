@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "renderer/scene/iau_rotation.h"
-#include "renderer/scene/mesh_file.h"
-#include "renderer/scene/sun_direction.h"
-#include "tests/renderer/scene_support.h"
+#include "renderer/assets/mesh_file.h"
+#include "renderer/ephemeris/iau_rotation.h"
+#include "renderer/ephemeris/sun_direction.h"
+#include "tests/renderer/scene_file/scene_support.h"
 
 namespace narpa {
 namespace {

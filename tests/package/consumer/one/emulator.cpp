@@ -1,6 +1,6 @@
 // From a scene file to a range.
 #include <narpa/emulator/world.h>
-#include <narpa/renderer/scene/scene_file.h>
+#include <narpa/renderer/scene_file/scene_file.h>
 #include <cstdio>
 #include <string>
 

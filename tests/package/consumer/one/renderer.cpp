@@ -1,7 +1,7 @@
 // From a scene file to an image file.
-#include <narpa/renderer/film/camera_image.h>
+#include <narpa/renderer/frame/camera_image.h>
 #include <narpa/renderer/image/image_file.h>
-#include <narpa/renderer/scene/scene_file.h>
+#include <narpa/renderer/scene_file/scene_file.h>
 #include <cstdio>
 #include <string>
 

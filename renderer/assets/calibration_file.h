@@ -1,0 +1,28 @@
+/// renderer/assets/calibration_file.h - a camera's calibration in the files of OpenCV and ROS.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "base/result.h"
+#include "renderer/projection/distortion.h"
+
+namespace narpa {
+
+inline constexpr int kMaxPixelsPerSide = 16384;  ///< of a camera's image
+
+struct Calibration {
+    int width = 0, height = 0;
+    Pinhole pinhole;
+    std::optional<Distortion> distortion;  ///< none where all coefficients are 0
+};
+
+/// YAML: `camera_info` of ROS (`distortion_model` is plumb_bob, rational_polynomial, equidistant or fisheye) and
+/// what OpenCV's calibration samples write (`fisheye_model`). Read are image_width, image_height, camera_matrix and
+/// distortion_coefficients; rectification and projection are not. Errors name the file and the line.
+[[nodiscard]] Result<Calibration> read_calibration(const std::string& file);
+
+/// The text of a file that both can read.
+[[nodiscard]] std::string calibration_text(const std::string& camera_name, const Calibration& calibration);
+
+}  // namespace narpa

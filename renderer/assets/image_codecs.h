@@ -1,0 +1,30 @@
+/// renderer/assets/image_codecs.h - OpenCV's image codecs, loaded when the first image is read or written.
+///
+/// Debian's libopencv_imgcodecs needs 140 other libraries, GDAL's among them: a program that is linked to it starts
+/// in 80 to 110 ms, one that is not in a tenth of that.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace cv {
+class _InputArray;
+class Mat;
+}  // namespace cv
+
+namespace narpa {
+
+/// The functions of opencv2/imgcodecs.hpp.
+struct ImageCodecs {
+    cv::Mat (*imdecode)(const cv::_InputArray& bytes, int flags) = nullptr;
+    bool (*imencode)(const std::string& extension, const cv::_InputArray& image, std::vector<unsigned char>& bytes,
+                     const std::vector<int>& parameters) = nullptr;
+};
+
+/// The codecs; thread-safe. Errors name `file` and the loader's reason: the library or one of its functions is
+/// missing.
+Result<ImageCodecs> image_codecs(const std::string& file);
+
+}  // namespace narpa

@@ -1,0 +1,253 @@
+#include "renderer/assets/mesh_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "base/file_bytes.h"
+#include "renderer/assets/mesh_process.h"
+#include "renderer/assets/mesh_readers.h"
+#include "renderer/assets/smooth_normals.h"
+
+namespace narpa {
+
+namespace {
+
+/// Gives equal keys the same number, counting from 0 in the order in which they first appear.
+template <std::size_t N>
+class Numbering {
+public:
+    using Key = std::array<std::uint32_t, N>;
+    explicit Numbering(std::size_t expected) : slots_(std::bit_ceil(2 * expected + 16), kFree) {
+        keys_.reserve(expected);
+    }
+    std::uint32_t number(const Key& key) {
+        if (2 * (keys_.size() + 1) > slots_.size()) grow();
+        std::uint32_t& slot = slots_[find(key)];
+        if (slot == kFree) {
+            slot = static_cast<std::uint32_t>(keys_.size());
+            keys_.push_back(key);
+        }
+        return slot;
+    }
+    [[nodiscard]] const std::vector<Key>& keys() const { return keys_; }
+
+private:
+    static constexpr std::uint32_t kFree = 0xffff'ffffu;
+
+    [[nodiscard]] std::size_t find(const Key& key) const {
+        std::uint64_t h = 0x9e37'79b9'7f4a'7c15ull;
+        for (const std::uint32_t word : key) h = (h ^ word) * 0xff51'afd7'ed55'8ccdull, h ^= h >> 32;
+        std::size_t i = h & (slots_.size() - 1);
+        while (slots_[i] != kFree && keys_[slots_[i]] != key) i = (i + 1) & (slots_.size() - 1);
+        return i;
+    }
+    void grow() {
+        slots_.assign(2 * slots_.size(), kFree);
+        for (std::size_t k = 0; k < keys_.size(); ++k) slots_[find(keys_[k])] = static_cast<std::uint32_t>(k);
+    }
+    std::vector<std::uint32_t> slots_;
+    std::vector<Key> keys_;
+};
+
+/// Bit pattern for keys, equal for equal numbers: -0 counts as 0.
+std::uint32_t bits(float x) {
+    return std::bit_cast<std::uint32_t>(x + 0.0f);
+}
+float from_bits(std::uint32_t b) {
+    return std::bit_cast<float>(b);
+}
+
+/// Twice the triangle's area, as a vector along its normal.
+Vec3 area_vector(const std::array<Vec3f, 3>& p) {
+    const Vec3 a = vec_cast<double>(p[0]);
+    return cross(vec_cast<double>(p[1]) - a, vec_cast<double>(p[2]) - a);
+}
+
+bool is_degenerate(const std::array<Vec3f, 3>& p) {
+    double longest2 = 0;
+    for (int i = 0; i < 3; ++i) {
+        const Vec3 side = vec_cast<double>(p[static_cast<std::size_t>((i + 1) % 3)]) -
+                          vec_cast<double>(p[static_cast<std::size_t>(i)]);
+        longest2 = std::max(longest2, dot(side, side));
+    }
+    return !(norm(area_vector(p)) > 0x1p-24 * longest2);
+}
+
+/// Drops bad triangles of a soup and welds its vertices into a Mesh.
+class MeshBuilder {
+public:
+    MeshBuilder(TriangleSoup& soup, double scale)
+        : soup_(soup),
+          points_(soup.positions.size()),
+          triangles_(soup.triangles.size()),
+          vertices_(soup.positions.size()),
+          last_(soup.positions.size()) {
+        scaled_.reserve(soup.positions.size());
+        for (const Vec3& p : soup.positions) scaled_.push_back(vec_cast<float>(scale * p));
+        out_.mesh.faces.reserve(soup.triangles.size());
+        out_.mesh.face_material.reserve(soup.triangles.size());
+    }
+
+    MeshFile build() {
+        for (const TriangleSoup::Triangle& t : soup_.triangles) sift(t);
+        const bool with_normals = !soup_.normals.empty(), with_uvs = !soup_.uvs.empty();
+        const std::size_t n = vertices_.keys().size();
+        out_.mesh.positions.reserve(n);
+        if (with_normals) out_.mesh.normals.reserve(n);
+        if (with_uvs) out_.mesh.uvs.reserve(n);
+        for (const VertexKey& v : vertices_.keys()) {
+            const auto& p = points_.keys()[v[0]];
+            out_.mesh.positions.push_back({from_bits(p[0]), from_bits(p[1]), from_bits(p[2])});
+            if (with_normals) out_.mesh.normals.push_back({from_bits(v[1]), from_bits(v[2]), from_bits(v[3])});
+            if (with_uvs) out_.mesh.uvs.push_back({from_bits(v[4]), from_bits(v[5])});
+        }
+        out_.materials = std::move(soup_.materials);
+        out_.warnings = std::move(soup_.warnings);
+        return std::move(out_);
+    }
+
+private:
+    using VertexKey = std::array<std::uint32_t, 6>;  // point, normal x y z, u, v
+
+    void sift(const TriangleSoup::Triangle& t) {
+        std::array<Vec3f, 3> p;
+        std::array<std::uint32_t, 3> point{};
+        for (std::size_t i = 0; i < 3; ++i) {
+            p[i] = scaled_[t.corners[i].position];
+            if (!is_finite(p[i])) return void(++out_.non_finite);
+            std::uint32_t& known = last_[t.corners[i].position].point;
+            if (known == kUnknown) known = points_.number({bits(p[i].x), bits(p[i].y), bits(p[i].z)});
+            point[i] = known;
+        }
+        if (is_degenerate(p)) return void(++out_.degenerate);
+        std::array<std::uint32_t, 3> sorted = point;
+        std::sort(sorted.begin(), sorted.end());
+        const std::size_t known = triangles_.keys().size();
+        if (triangles_.number(sorted) < known) return void(++out_.duplicate);
+        add(t, p, point);
+    }
+
+    void add(const TriangleSoup::Triangle& t, const std::array<Vec3f, 3>& p,
+             const std::array<std::uint32_t, 3>& point) {
+        const Vec3f flat = soup_.normals.empty() ? Vec3f{} : vec_cast<float>(normalized(area_vector(p)));
+        std::array<std::uint32_t, 3> face{};
+        for (std::size_t i = 0; i < 3; ++i) {
+            const TriangleSoup::Corner& c = t.corners[i];
+            Last& last = last_[c.position];
+            if (last.vertex == kUnknown || last.uv != c.uv || last.normal != c.normal) {
+                const auto [n, is_flat] = normal_of(c, flat);
+                const std::array<float, 2> uv = uv_of(c);
+                face[i] = vertices_.number({point[i], bits(n.x), bits(n.y), bits(n.z), bits(uv[0]), bits(uv[1])});
+                last = {point[i], c.uv, c.normal, is_flat ? kUnknown : face[i]};
+            } else {
+                face[i] = last.vertex;
+            }
+        }
+        out_.mesh.faces.push_back(face);
+        out_.mesh.face_material.push_back(t.material);
+    }
+
+    struct Normal {
+        Vec3f n;
+        bool is_flat;  ///< the triangle's own
+    };
+    /// The corner's normal; where the file gives none that can be used, the triangle's own.
+    [[nodiscard]] Normal normal_of(const TriangleSoup::Corner& c, const Vec3f& flat) const {
+        if (soup_.normals.empty()) return {{}, false};
+        if (c.normal == TriangleSoup::kNone) return {flat, true};
+        const Vec3 n = vec_cast<double>(soup_.normals[c.normal]);
+        const double length = norm(n);
+        if (!(length > 0) || !std::isfinite(length)) return {flat, true};
+        return {vec_cast<float>(n / length), false};
+    }
+
+    [[nodiscard]] std::array<float, 2> uv_of(const TriangleSoup::Corner& c) const {
+        if (c.uv == TriangleSoup::kNone) return {0, 0};
+        const auto& uv = soup_.uvs[c.uv];
+        return std::isfinite(uv[0]) && std::isfinite(uv[1]) ? uv : std::array<float, 2>{0, 0};
+    }
+
+    static constexpr std::uint32_t kUnknown = 0xffff'ffffu;
+    /// Cache: the last vertex used at a position, which most other triangles there share.
+    struct Last {
+        std::uint32_t point = kUnknown, uv = 0, normal = 0, vertex = kUnknown;
+    };
+
+    TriangleSoup& soup_;
+    std::vector<Vec3f> scaled_;
+    Numbering<3> points_, triangles_;
+    Numbering<6> vertices_;
+    std::vector<Last> last_;
+    MeshFile out_;
+};
+
+/// A texture needs coordinates: triangles without them get the material without it.
+void take_textures_off_bare_triangles(TriangleSoup& soup, const std::string& path) {
+    const std::size_t given = soup.materials.size();
+    std::vector<std::size_t> bare(given, 0);  // the material without its texture; 0 is none yet
+    for (TriangleSoup::Triangle& t : soup.triangles) {
+        const bool has_uvs = std::all_of(t.corners.begin(), t.corners.end(),
+                                         [](const auto& c) { return c.uv != TriangleSoup::kNone; });
+        if (has_uvs || !soup.materials[t.material].has_textures()) continue;
+        std::size_t& without = bare[t.material];
+        if (without == 0) {
+            if (soup.materials.size() >= kMaxMaterials) return;
+            without = soup.materials.size();
+            soup.warnings.push_back(
+                fmt::format("{}: triangles of material \"{}\" have no texture coordinates; its "
+                            "textures are not used on them",
+                            path, soup.materials[t.material].material.name));
+            soup.materials.push_back({.material = soup.materials[t.material].material});
+        }
+        t.material = static_cast<std::uint16_t>(without);
+    }
+}
+
+void tell_dropped(MeshFile& file, const std::string& path) {
+    const auto warn = [&](std::size_t count, std::string_view kind) {
+        if (count > 0)
+            file.warnings.push_back(
+                fmt::format("{}: {} {} triangle{} dropped", path, count, kind, count > 1 ? "s" : ""));
+    };
+    warn(file.non_finite, "not finite (NaN or infinite coordinates)");
+    warn(file.degenerate, "degenerate (without area)");
+    warn(file.duplicate, "duplicated");
+}
+
+}  // namespace
+
+Result<MeshFile> read_mesh(const std::string& path, double scale, double crease_rad,
+                           const MeshReaderLimits& limits) {
+    if (const Status plain = check_plain_file(path); !plain) return plain.error();
+    const std::string extension = extension_of(path);
+    const bool is_obj = extension == ".obj" || extension == ".tab";
+    const bool is_icq = extension == ".icq";
+    if (!is_obj && !is_icq && !is_read_in_process(extension))
+        return Error{.what = fmt::format("not a mesh format that can be read, expected {}", kMeshExtensions),
+                     .file = path};
+    Result<TriangleSoup> soup = is_obj   ? read_obj(path)
+                                : is_icq ? read_icq(path)
+                                         : read_soup_in_process(path, limits);
+    if (!soup) return soup.error();
+    take_textures_off_bare_triangles(*soup, path);
+    if (soup->triangles.empty())
+        return Error{.what = "no triangles in it, expected a mesh with faces", .file = path};
+    const std::size_t given = soup->triangles.size();
+    if (crease_rad > 0 && soup->normals.empty())
+        add_smooth_normals(*soup, crease_rad);
+    else if (crease_rad > 0)
+        soup->warnings.push_back(path + ": has normals of its own, crease_angle_deg is not used");
+    MeshFile file = MeshBuilder(*soup, scale).build();
+    file.mesh.name = path;
+    if (file.mesh.faces.empty())
+        return Error{.what = fmt::format("none of its {} triangles can be used: {} not finite, {} degenerate",
+                                         given, file.non_finite, file.degenerate),
+                     .file = path};
+    tell_dropped(file, path);
+    return file;
+}
+
+}  // namespace narpa

@@ -1,0 +1,151 @@
+#include "renderer/frame/camera_batch.h"
+
+#include "base/each_isa.h"
+#include "renderer/camera/lens.h"
+#include "renderer/integrator/batch_sampler.h"
+#include "renderer/integrator/path_dimensions.h"
+
+namespace narpa {
+namespace {
+
+// Lanes from the batch's `n` on are computed with the others and never read. Results are gathered in local arrays,
+// which the compiler knows not to alias anything.
+
+using Points = BatchSampler::Points;
+
+BatchSampler sampler_of(const Frame& f, const CameraSamples& s) noexcept {
+    return {f.settings.seed, f.settings.frame, s.n, s.number, s.sample};
+}
+
+struct ImagePoints {
+    Lanes<double> x, y;
+};
+
+void aim_through(const Frame& f, const ImagePoints& p, RayBatch& rays) noexcept {
+    f.model->directions(f.T_world_camera.q, p.x, p.y, rays.direction);
+    rays.origin.fill(f.T_world_camera.t);
+}
+
+void aim_at_centres(const Frame& f, const CameraSamples& s, RayBatch& rays) noexcept {
+    ImagePoints p;
+    for (std::size_t i = 0; i < kLanes; ++i) p.x[i] = s.x[i], p.y[i] = s.y[i];
+    aim_through(f, p, rays);
+}
+
+/// Each sample's point in its pixel. `u`: out, sample coordinates; the last two are unused here.
+NARPA_EACH_ISA void points_in_pixels(const Frame& f, const CameraSamples& s, ImagePoints& p, Points& u) noexcept {
+    sampler_of(f, s).points(u);
+    if (s.centre) u[0].fill(0.5), u[1].fill(0.5);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        p.x[i] = s.x[i] + u[0][i] - 0.5;
+        p.y[i] = s.y[i] + u[1][i] - 0.5;
+    }
+}
+
+/// Moves rays through the centre of the lens to the points (u, v) of the aperture. `rays`: in, directions in camera
+/// axes.
+NARPA_EACH_ISA void move_over_lens(const Lens& lens, const Rigid3& T_world_camera, const Lanes<double>& u,
+                                   const Lanes<double>& v, RayBatch& rays) noexcept {
+    Vec3Lanes origin, direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 from = aperture_point(lens, u[i], v[i]);
+        origin.put(i, T_world_camera * from);
+        direction.put(i, T_world_camera.q * lens_direction(lens, rays.direction[i], from));
+    }
+    rays.origin = origin;
+    rays.direction = direction;
+}
+
+NARPA_EACH_ISA void next_points(const Frame& f, const CameraSamples& s, std::uint32_t group, Points& u) noexcept {
+    sampler_of(f, s).points(group, u);
+}
+
+NARPA_EACH_ISA void aim_at_sun(const SunDisc& sun, const Lanes<double>& u, const Lanes<double>& v,
+                               Vec3Lanes& to_sun) noexcept {
+    Vec3Lanes direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 d = sun.sample(u[i], v[i]);
+        direction.x[i] = d.x, direction.y[i] = d.y, direction.z[i] = d.z;
+    }
+    to_sun = direction;
+}
+
+/// The dimensions with which a path would choose its point on the Sun from the first surface; free if that point is
+/// chosen here.
+constexpr std::uint32_t kPathsOwn = 2;
+
+/// Aims the camera rays. Points on the Sun are chosen only if it is the only light or is sampled separately; paths
+/// choose their own.
+void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, CameraBatch& p) noexcept {
+    const bool sun = f.sun && (f.sun_only || f.separate_sun);
+    p.rays.n = s.n;
+    if (s.centre && f.one_sample()) {
+        aim_at_centres(f, s, p.rays);
+        if (f.sun_only && sun) p.to_sun.fill(f.sun->centre());
+        if (f.sun_only || !sun) return;
+        Points u;
+        next_points(f, s, kPathsOwn, u);
+        aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
+        return;
+    }
+    Points u;
+    ImagePoints image;
+    points_in_pixels(f, s, image, u);
+    if (f.lens == nullptr) {
+        aim_through(f, image, p.rays);
+        if (sun) aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
+    } else {
+        f.model->directions({}, image.x, image.y, p.rays.direction);
+        move_over_lens(*f.lens, f.T_world_camera, u[2], u[3], p.rays);
+        if (!sun) return;
+        next_points(f, s, kPathsOwn, u);
+        aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
+    }
+}
+
+/// Moves rays from the camera's pose at mid-exposure to its pose at their own times. `u`: time within the exposure
+/// of their row, in [0, 1).
+void move_to_times(const Frame& f, const CameraSamples& s, const Lanes<double>& u, RayBatch& rays) noexcept {
+    for (std::size_t i = 0; i < s.n; ++i) {
+        const double time = f.pose.time(s.y[i], f.camera.height, u[i]);
+        const Rigid3 T = f.pose.at(time);
+        const Quat turn = T.q * conjugate(f.T_world_camera.q);
+        rays.put(i, {T.t + turn * (rays.origin[i] - f.T_world_camera.t), turn * rays.direction[i], time});
+    }
+}
+
+void aim(const Frame& f, const CameraSamples& s, CameraBatch& p) noexcept {
+    aim_at_mid_exposure(f, s, p);
+    if (!f.over_time) return;
+    Points u;
+    if (s.centre && f.one_sample())
+        u[0] = kMidExposureLanes;
+    else
+        next_points(f, s, kTimeGroup, u);
+    move_to_times(f, s, u[0], p.rays);
+}
+
+}  // namespace
+
+void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, CameraBatch& p) {
+    PhaseClock clock(p.times);
+    aim(f, s, p);
+    p.number = s.number;
+    p.sample = s.sample;
+    clock.ends(Phase::aim);
+    f.tracer.intersect(f.at, p.rays, bodies, p.hits);
+    p.rays_traced += s.n;
+    if (f.subpixel_bodies.any())
+        for (std::size_t i = 0; i < s.n; ++i) p.hits.put(i, f.subpixel_bodies.beyond(p.rays[i], p.hits[i]));
+    clock.ends(Phase::rays);
+}
+
+void trace_centres(const Frame& f, const CameraSamples& s, CameraBatch& p) {
+    p.rays.n = s.n;
+    aim_at_centres(f, s, p.rays);
+    if (f.over_time) move_to_times(f, s, kMidExposureLanes, p.rays);
+    f.tracer.intersect(f.at, p.rays, f.tracer.all_bodies(), p.hits);
+    p.rays_traced += s.n;
+}
+
+}  // namespace narpa

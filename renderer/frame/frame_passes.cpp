@@ -1,0 +1,379 @@
+#include "renderer/frame/frame_passes.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer/frame/tile_worker.h"
+#include "renderer/geometry/flush_denormals.h"
+
+namespace narpa {
+namespace {
+
+/// Tiles per task. Sums are formed per chunk, so that they do not depend on the threads.
+constexpr std::size_t kChunk = 8;
+/// With this many tiles or more, the error of a frame of centres is estimated from a tenth of them.
+constexpr std::size_t kManyTiles = 4096;
+
+/// The pixel that represents this one.
+int representative(int x, int width, int stride) {
+    return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
+}
+
+/// Finds tiles that may show light although no body is in view: the Sun's disc, area lights, a non-uniform
+/// background, a medium.
+class EmittersInView {
+public:
+    EmittersInView(const Frame& f, const Lens* lens) : f_(f) {
+        everywhere_ = !f.sun_only && (f.render_scene.lights().any_with_extent() ||
+                                      !f.render_scene.background().uniform() || f.render_scene.medium() != nullptr);
+        if (f.sun_only || f.path.direct || !f.sun || f.sun->is_point()) return;
+        // Generous upper bounds of the Sun's angular radius and of the deflection of rays by the lens.
+        const double disc_rad = f.tracer.scene().sun->angular_diameter_rad;
+        const double lens_rad = lens != nullptr ? lens->aperture_diameter_m / lens->focus_distance_m : 0;
+        within_rad_ = disc_rad + lens_rad;
+        sun_ = true;
+    }
+    /// True if rays through the tile at pixel (x, y) may meet an emitter.
+    [[nodiscard]] bool any(int x, int y) const {
+        if (everywhere_ || !sun_) return everywhere_;
+        const DirectionCone tile = f_.model->bounds({x - 0.5, y - 0.5, x + kTile - 0.5, y + kTile - 0.5});
+        const Vec3 to_tile = f_.T_world_camera.q * tile.axis, &to_sun = f_.sun->centre();
+        return std::atan2(norm(cross(to_tile, to_sun)), dot(to_tile, to_sun)) < within_rad_ + tile.half_angle_rad;
+    }
+
+private:
+    const Frame& f_;
+    bool everywhere_ = false, sun_ = false;
+    double within_rad_ = 0;
+};
+
+// Lattices of tiles; the first consists of blocks of 4 x 4 tiles.
+bool in_a_tenth(int tx, int ty) {
+    return (tx / 4 + 3 * (ty / 4)) % 10 == 0;
+}
+bool in_a_sixteenth(int tx, int ty) {
+    return (tx + 6 * ty) % 16 == 0;
+}
+
+}  // namespace
+
+FramePasses::FramePasses(const Tracer& tracer, const Camera& camera)
+    : camera_(camera),
+      culling_(tracer, camera),
+      g_buffer_(camera.width, camera.height),
+      errors_(g_buffer_.tiles() / kChunk + 1),
+      blank_(g_buffer_.tiles(), 0) {
+    tiles_.reserve(g_buffer_.tiles());
+}
+
+FramePasses::Tile FramePasses::tile(std::uint32_t index) const noexcept {
+    const int tx = static_cast<int>(index) % g_buffer_.tiles_x(),
+              ty = static_cast<int>(index) / g_buffer_.tiles_x();
+    const int x = tx * kTile, y = ty * kTile;
+    return {index,
+            x,
+            y,
+            std::min(kTile, camera_.width - x),
+            std::min(kTile, camera_.height - y),
+            culling_.bodies(tx, ty)};
+}
+
+template <class Work>
+PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work) {
+    const std::int64_t start = now_ns();
+    std::atomic<bool> stop{false};
+    std::atomic<std::uint64_t> samples{0}, rays{0}, paths{0}, path_rays{0}, met{0}, separate{0};
+    const auto over_chunk = [&](std::size_t chunk, auto&& storage) {
+        const std::int64_t chunk_start = f.settings.times ? now_ns() : 0;
+        PhaseTimes times{};
+        Worker w(f, limit, stop, f.settings.times ? &times : nullptr, storage);
+        const std::size_t first = chunk * kChunk, end = std::min(first + kChunk, tiles_.size());
+        for (std::size_t i = first; i < end; ++i) {
+            w.read_clock();
+            if (stop.load(std::memory_order_relaxed)) break;
+            work(w, tile(tiles_[i]));
+        }
+        samples.fetch_add(w.samples_traced(), std::memory_order_relaxed);
+        paths.fetch_add(w.paths_traced(), std::memory_order_relaxed);
+        met.fetch_add(w.met(), std::memory_order_relaxed);
+        separate.fetch_add(w.separate(), std::memory_order_relaxed);
+        path_rays.fetch_add(w.rays_traced(&CameraBatch::path_rays), std::memory_order_relaxed);
+        if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
+            stop.store(true, std::memory_order_relaxed);
+        if (sums == Sums::errors) errors_[chunk] = w.error;
+        if (!f.settings.times) return;
+        std::int64_t rest = now_ns() - chunk_start;
+        for (std::size_t i = 0; i < kPhases; ++i) rest -= times[i];
+        times[static_cast<std::size_t>(Phase::passes)] += rest;
+        for (std::size_t i = 0; i < kPhases; ++i) phase_ns_[i].fetch_add(times[i], std::memory_order_relaxed);
+    };
+    const std::size_t chunks = (tiles_.size() + kChunk - 1) / kChunk;
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, chunks, 1),
+        [&](const tbb::blocked_range<std::size_t>& one) {
+            if (stop.load(std::memory_order_relaxed)) return;
+            const FlushDenormals flush;
+            if (f.sun_only)
+                over_chunk(one.begin(), Worker::Storage<1>());
+            else
+                over_chunk(one.begin(), Worker::Storage<kMaxBatches>());
+        },
+        tbb::simple_partitioner());
+    return {!stop, samples, rays, paths, path_rays, met, separate, now_ns() - start};
+}
+
+void FramePasses::begin(const Frame& f, const Lens* lens) {
+    find_background(f);
+    g_buffer_.begin_frame(background_);
+    if (f.settings.mechanisms.tile_culling && !f.over_time)
+        culling_.update(f.at, f.T_world_camera, lens);
+    else
+        culling_.list_all();
+    const EmittersInView emitters(f, lens);
+    tiles_.clear();
+    pixels_ = 0;
+    for (std::uint32_t i = 0; i < g_buffer_.tiles(); ++i) {
+        const Tile t = tile(i);
+        if (t.bodies.empty() && !f.over_time && !emitters.any(t.x, t.y)) continue;
+        tiles_.push_back(i);
+        g_buffer_.set_traced(i);
+        pixels_ += static_cast<std::uint64_t>(t.width * t.height);
+    }
+}
+
+/// Radiance of an escaped ray that points away from the Sun.
+void FramePasses::find_background(const Frame& f) {
+    CameraBatch p;
+    RgbLanes radiance;
+    p.rays.n = 1;
+    p.rays.put(0, {f.T_world_camera.t, f.sun ? -f.sun->centre() : f.T_world_camera.q * Vec3{0, 0, 1}});
+    p.hits.met = 0;
+    p.hits.body.fill(-1);
+    if (f.sun) p.to_sun.fill(f.sun->centre());
+    f.integrator.radiance(f, p, radiance);
+    background_ = radiance[0];
+}
+
+void FramePasses::fill_background(RadianceImage& out) {
+    if (blank_image_ != out.pixels.data() || blank_background_ != background_)
+        std::fill(blank_.begin(), blank_.end(), std::uint8_t{0});
+    blank_image_ = out.pixels.data();
+    blank_background_ = background_;
+    tbb::parallel_for(0, g_buffer_.tiles_y(), [&](int ty) {
+        for (int tx = 0; tx < g_buffer_.tiles_x(); ++tx) {
+            const auto i = static_cast<std::uint32_t>(ty * g_buffer_.tiles_x() + tx);
+            const Tile t = tile(i);
+            Rgb* const first = &out.pixels[static_cast<std::size_t>(t.y) * static_cast<std::size_t>(out.width) +
+                                           static_cast<std::size_t>(t.x)];
+            const bool stays = blank_[i] != 0 && *first == background_;  // else `out` is another image
+            blank_[i] = !g_buffer_.is_traced(i);
+            if (blank_[i] == 0 || stays) continue;
+            for (int y = 0; y < t.height; ++y)
+                std::fill_n(first + static_cast<std::ptrdiff_t>(y) * out.width, t.width, background_);
+        }
+    });
+}
+
+PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance,
+                               std::span<const std::uint8_t> chosen) {
+    fill_background(out);
+    const PassCount count = over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
+        if (f.one_sample())
+            show_one_sample(w, t, out);
+        else
+            show_samples(w, t, chosen, out, variance);
+        add_subpixel_light(f, t, out, variance);
+        if (f.settings.pixels_done != nullptr)
+            f.settings.pixels_done->fetch_add(static_cast<std::size_t>(t.width * t.height),
+                                              std::memory_order_relaxed);
+    });
+    if (f.settings.pixels_done != nullptr)
+        f.settings.pixels_done->fetch_add(out.pixels.size() - pixels_, std::memory_order_relaxed);
+    if (f.one_sample()) estimate_centres(f);
+    return count;
+}
+
+void FramePasses::show_samples(Worker& w, const Tile& t, std::span<const std::uint8_t> chosen, RadianceImage& out,
+                               std::vector<float>* variance) {
+    PerPixel<PixelMeans> means{};
+    PerPixel<PixelSamples> spread, spread_by_paths;
+    PerPixel<std::uint32_t> count;
+    count.fill(static_cast<std::uint32_t>(w.f.settings.spp));
+    if (!chosen.empty()) {
+        bool any = false;
+        t.each_pixel([&](int x, int y, std::size_t at) {
+            const bool is_chosen = chosen[index_of(x, y, out.width)] != 0;
+            any = any || is_chosen;
+            if (!is_chosen) count[at] = 0;
+        });
+        if (!any) return;
+    }
+    const auto none = [](std::size_t) { return 0u; };
+    const auto all = [&](std::size_t at) { return count[at]; };
+    w.samples(t, out.width, none, all, [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
+        add_samples(b, light, means);
+        if (variance == nullptr) return;
+        for_each_lane(b.direct_lanes, [&](std::size_t i) { spread[b.place[i]].add(light.direct[i]); });
+        for_each_lane(b.path_lanes, [&](std::size_t i) { spread_by_paths[b.place[i]].add(light.path[i]); });
+    });
+    t.each_pixel([&](int x, int y, std::size_t at) {
+        if (count[at] == 0) return;
+        out.pixels[index_of(x, y, out.width)] = vec_cast<float>(means[at].mean());
+        w.error.add(means[at]);
+    });
+    if (variance == nullptr) return;
+    t.each_pixel([&](int x, int y, std::size_t) { (*variance)[index_of(x, y, out.width)] = 0; });
+    add_variances(t, spread, means, &PixelMeans::direct, out.width, *variance);
+    add_variances(t, spread_by_paths, means, &PixelMeans::path, out.width, *variance);
+}
+
+void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) {
+    prefetch_pixels(t, out);
+    if (fills_g_buffer(t.index)) {
+        w.centres(t, out.width, out.height, 1, 0, g_buffer_);
+        const GBufferTile& centres = g_buffer_.tile(t.index);
+        return put_pixels(t, centres.r, centres.g, centres.b, out);
+    }
+    PerPixel<float> r, g, b;
+    w.centres(t, out.width, out.height, 1, 0,
+              [&](const SampleBatch& batch, const CameraBatch&, const BatchRadiance& light) {
+                  put_in_tile(w.f, light, batch.place, batch.samples.n, r, g, b);
+              });
+    put_pixels(t, r, g, b, out);
+}
+
+/// True if the tile is used for the error estimate: all tiles, or a tenth of many. On the craft at 1024 x 1024 this
+/// estimate differs by 3 % from that of all tiles.
+bool FramePasses::estimates(std::uint32_t tile) const noexcept {
+    const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
+    return tiles_.size() < kManyTiles || in_a_tenth(tx, ty);
+}
+
+/// The tiles of the error estimate and their neighbours.
+bool FramePasses::fills_g_buffer(std::uint32_t tile) const noexcept {
+    if (tiles_.size() < kManyTiles) return true;
+    const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
+    for (int y = ty - 1; y <= ty + 1; ++y)
+        for (int x = tx - 1; x <= tx + 1; ++x)
+            if (x >= 0 && y >= 0 && in_a_tenth(x, y)) return true;
+    return false;
+}
+
+void FramePasses::estimate_centres(const Frame& f) {
+    const auto counts = [&](std::uint32_t tile) { return estimates(tile); };
+    const double counted = static_cast<double>(std::count_if(tiles_.begin(), tiles_.end(), counts));
+    over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
+        if (!counts(t.index)) return;
+        TileContrast contrast;
+        g_buffer_.contrast(f, t.index, contrast);
+        w.error.add_centres(contrast, static_cast<double>(tiles_.size()) / counted);
+    });
+}
+
+PassCount FramePasses::centres(const Frame& f, int stride, int made, const PassLimit& limit) {
+    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        w.centres(t, camera_.width, camera_.height, stride, made, g_buffer_);
+    });
+}
+
+void FramePasses::show_centres(const Frame& f, int stride, RadianceImage& out) {
+    fill_background(out);
+    over_tiles(f, Sums::counts, {}, [&](Worker&, const Tile& t) {
+        const GBufferTile& centres = g_buffer_.tile(t.index);
+        t.each_pixel([&](int x, int y, std::size_t) {
+            const int from_x = representative(x, out.width, stride), from_y = representative(y, out.height, stride);
+            out.pixels[index_of(x, y, out.width)] =
+                radiance_at(centres, place_in_tile(from_x % kTile, from_y % kTile));
+        });
+        add_subpixel_light(f, t, out, nullptr);
+    });
+}
+
+void FramePasses::make_plan(const Frame& f, bool adaptive) {
+    if (!plan_) plan_.emplace(g_buffer_.tiles());
+    if (means_.empty()) means_.resize(g_buffer_.tiles());
+    if (f.separate_sun && !sunlight_plan_) sunlight_plan_.emplace(g_buffer_.tiles());
+    if (!adaptive) return plan_->make_uniform(f, tiles_);
+    plan_->weigh(f, g_buffer_, tiles_);
+    over_tiles(f, Sums::errors, {},
+               [&](Worker& w, const Tile& t) { w.error.add_centres(plan_->contrast(t.index)); });
+}
+
+PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
+                              Tiles which) {
+    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        if (which != Tiles::all && in_a_sixteenth(t.x / kTile, t.y / kTile) != (which == Tiles::a_sixteenth))
+            return;
+        const auto begin = [&](std::size_t at) { return plan_->count(t.index, at, from); };
+        const auto end = [&](std::size_t at) { return plan_->count(t.index, at, to); };
+        PerPixel<PixelMeans>& means = means_[t.index];
+        t.each_pixel([&](int, int, std::size_t at) {
+            if (begin(at) == 0) means[at] = {};
+        });
+        // The first samples of a uniform plan fill the G-buffer: with fewer than two samples per pixel, the error
+        // comes from contrasts.
+        const bool fill = plan_->is_uniform() && from == SamplePlan::none();
+        w.samples(t, camera_.width, begin, end,
+                  [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& light) {
+                      add_samples(b, light, means);
+                      if (fill) g_buffer_.store(f, p, light, b.place, t.index);
+                  });
+    });
+}
+
+void FramePasses::plan_sunlight(const Frame& f) {
+    if (tiles_.size() < g_buffer_.tiles()) sunlight_plan_->clear();
+    sunlight_plan_->weigh(f, g_buffer_, tiles_);
+}
+
+PassCount FramePasses::refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to,
+                                       const PassLimit& limit) {
+    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        w.with_paths = false;
+        const auto begin = [&](std::size_t) { return each; };
+        const auto end = [&](std::size_t at) { return std::max(each, sunlight_plan_->count(t.index, at, to)); };
+        PerPixel<PixelMeans>& means = means_[t.index];
+        w.samples(t, camera_.width, begin, end,
+                  [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
+                      add_samples(b, light, means);
+                  });
+    });
+}
+
+void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out,
+                             std::vector<float>* variance) {
+    fill_background(out);
+    const bool uniform = plan_->is_uniform();
+    const bool needs_contrast = uniform && (variance != nullptr || !SamplePlan::reaches(stage, 2));
+    over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
+        const GBufferTile& centres = g_buffer_.tile(t.index);
+        const PerPixel<PixelMeans>& means = means_[t.index];
+        t.each_pixel([&](int x, int y, std::size_t at) {
+            out.pixels[index_of(x, y, out.width)] =
+                means[at].count() > 0 ? vec_cast<float>(means[at].mean()) : radiance_at(centres, at);
+        });
+        TileContrast of_samples;
+        if (needs_contrast) g_buffer_.contrast(f, t.index, of_samples);
+        const TileContrast& contrast = uniform ? of_samples : plan_->contrast(t.index);
+        w.error.add_tile(uniform && !needs_contrast ? nullptr : &contrast, means);
+        if (variance != nullptr) put_variances(t, means, contrast, out.width, *variance);
+        add_subpixel_light(f, t, out, variance);
+    });
+}
+
+double FramePasses::standard_error() const noexcept {
+    FrameError sum;
+    for (std::size_t chunk = 0; chunk * kChunk < tiles_.size(); ++chunk) sum += errors_[chunk];
+    return sum.standard_error(static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height));
+}
+
+PhaseTimes FramePasses::times() noexcept {
+    PhaseTimes times;
+    for (std::size_t i = 0; i < kPhases; ++i) times[i] = phase_ns_[i].exchange(0, std::memory_order_relaxed);
+    return times;
+}
+
+}  // namespace narpa

@@ -1,0 +1,118 @@
+/// renderer/frame/frame_passes.h - the rendering passes of a frame.
+///
+/// A pass covers the tiles that may show something; the others show the background. A pass completes or is
+/// discarded as a whole; `show_...` then writes its result to the image.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "renderer/frame/frame_error.h"
+#include "renderer/frame/g_buffer.h"
+#include "renderer/frame/sample_plan.h"
+#include "renderer/frame/tile_culling.h"
+#include "renderer/image/radiance_image.h"
+
+namespace narpa {
+
+/// Limits at which a pass is aborted.
+struct PassLimit {
+    std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();  ///< CLOCK_MONOTONIC
+    std::uint64_t rays = std::numeric_limits<std::uint64_t>::max();
+};
+
+struct PassCount {
+    bool complete = true;
+    std::uint64_t samples = 0, rays = 0;
+    std::uint64_t paths = 0, path_rays = 0;  ///< samples with a path; rays beyond first surfaces
+    std::uint64_t met = 0, separate = 0;     ///< samples that hit a surface; those with separate direct sunlight
+    std::int64_t wall_ns = 0;
+};
+
+class FramePasses {
+public:
+    /// Both arguments outlive it.
+    FramePasses(const Tracer& tracer, const Camera& camera);
+
+    /// Prepares a frame: finds the tiles that may show something. `lens`: its blur is allowed for; null: no blur.
+    void begin(const Frame& f, const Lens* lens);
+    /// Number of pixels in the tiles that may show something.
+    [[nodiscard]] std::uint64_t pixels() const noexcept { return pixels_; }
+
+    /// Renders each pixel with `spp` samples and writes the image. Writes the variance to `variance` unless null.
+    /// `chosen`: renders only pixels where it is not 0; the others are undefined, and `spp` is at least 2. Empty:
+    /// all pixels.
+    PassCount uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance,
+                      std::span<const std::uint8_t> chosen = {});
+
+    /// Tiles that a pass covers; the sixteenth is evenly spread.
+    enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
+    /// Traces the centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, except those of an
+    /// earlier pass of stride `made` (0: none).
+    PassCount centres(const Frame& f, int stride, int made, const PassLimit& limit);
+    void show_centres(const Frame& f, int stride, RadianceImage& out);
+
+    /// Makes an adaptive plan from the contrasts of the centres, or a uniform plan.
+    void make_plan(const Frame& f, bool adaptive);
+    [[nodiscard]] const SamplePlan& plan() const noexcept { return *plan_; }
+    /// Traces the samples that stage `to` has beyond stage `from`.
+    PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
+                     Tiles which = Tiles::all);
+
+    /// If direct sunlight is separate: plans further samples of it from the contrasts of the centres, which must
+    /// come from a direct-light frame.
+    void plan_sunlight(const Frame& f);
+    [[nodiscard]] const SamplePlan& sunlight_plan() const noexcept { return *sunlight_plan_; }
+    /// Traces samples of direct sunlight alone: for each pixel those beyond the first `each`, up to stage `to` of
+    /// that plan.
+    PassCount refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to, const PassLimit& limit);
+
+    /// Writes the pixels' means at a stage of the plan to the image.
+    void show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out, std::vector<float>* variance);
+
+    /// Error of the image last written by `uniform` or `show_means`, or of the centres that the plan was made from.
+    [[nodiscard]] double standard_error() const noexcept;
+
+    /// Returns the time per phase since the last call, if FrameSettings::times is set.
+    [[nodiscard]] PhaseTimes times() noexcept;
+
+private:
+    class Worker;
+    struct Tile;
+    enum class Sums : std::uint8_t { counts, errors };
+    template <class Work>
+    PassCount over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work);
+    [[nodiscard]] Tile tile(std::uint32_t index) const noexcept;
+    void find_background(const Frame& f);
+    void fill_background(RadianceImage& out);
+    void show_one_sample(Worker& w, const Tile& t, RadianceImage& out);
+    void show_samples(Worker& w, const Tile& t, std::span<const std::uint8_t> chosen, RadianceImage& out,
+                      std::vector<float>* variance);
+    [[nodiscard]] bool estimates(std::uint32_t tile) const noexcept;
+    [[nodiscard]] bool fills_g_buffer(std::uint32_t tile) const noexcept;
+    void estimate_centres(const Frame& f);
+
+    const Camera& camera_;
+    TileCulling culling_;
+    GBuffer g_buffer_;
+    std::vector<std::uint32_t> tiles_;  ///< that may show something
+    std::uint64_t pixels_ = 0;
+    Rgb background_{};                ///< radiance of the other tiles
+    std::vector<FrameError> errors_;  ///< of each chunk of tiles
+
+    std::optional<SamplePlan> plan_, sunlight_plan_;  ///< allocated when first needed, as is means_
+    std::vector<PerPixel<PixelMeans>> means_;
+
+    // Tiles that still hold the background in the image that was last written, and that image's pixels and
+    // background.
+    std::vector<std::uint8_t> blank_;
+    const Rgb* blank_image_ = nullptr;
+    Rgb blank_background_{};
+    std::array<std::atomic<std::int64_t>, kPhases> phase_ns_{};
+};
+
+}  // namespace narpa

@@ -1,0 +1,368 @@
+/// renderer/frame/tile_worker.h - traces and shades a tile's samples: gathers them into ray batches, traces them,
+/// shades several batches together and passes them to a sink. Used only by frame_passes.cpp.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "renderer/frame/camera_batch.h"
+#include "renderer/frame/frame_passes.h"
+#include "renderer/frame/subpixel_light.h"
+
+namespace narpa {
+
+/// Batches between two clock reads.
+inline constexpr std::uint32_t kBatchesPerClockRead = 16;
+/// First random sequence of centres in frames that add samples; distinct from those of the pixels, because the
+/// centres decide how many samples a pixel gets.
+inline constexpr std::uint32_t kFirstCentre = 0x40000000u;
+inline constexpr int kBlock = 4;
+
+/// True for the pixel that represents a square of `stride` pixels: the second, or the last at the image's edge.
+inline bool represents(int x, int width, int stride) {
+    return stride == 1 || x % stride == 1 || (x % stride == 0 && x == width - 1);
+}
+
+struct FramePasses::Tile {
+    std::uint32_t index;
+    int x, y, width, height;  ///< pixels
+    std::span<const std::uint32_t> bodies;
+
+    [[nodiscard]] bool whole() const { return width == kTile && height == kTile; }
+    template <class Do>
+    void each_pixel(Do&& act) const {
+        for (int block = 0; block < 4; ++block)
+            for (int row = 0; row < kBlock; ++row)
+                for (int column = 0; column < kBlock; ++column) {
+                    const int px = block % 2 * kBlock + column, py = block / 2 * kBlock + row;
+                    if (px < width && py < height) act(x + px, y + py, place_in_tile(px, py));
+                }
+    }
+};
+
+/// Samples that are traced together.
+struct SampleBatch {
+    CameraSamples samples;
+    Lanes<std::uint8_t> place;  ///< index of each sample's pixel in the tile
+    std::uint32_t direct_lanes = 0,
+                  path_lanes = 0;  ///< the lanes that count for this part of the light (BatchRadiance)
+};
+
+/// Per-task state for several tiles; large.
+class FramePasses::Worker {
+public:
+    /// Memory for batches that are shaded together.
+    template <std::size_t N>
+    struct Storage {
+        std::array<CameraBatch, N> traced;
+        std::array<SampleBatch, N> batches;
+    };
+
+    template <std::size_t N>
+    Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& stop, PhaseTimes* times,
+           Storage<N>& storage)
+        : f(frame), until_ns_(limit.until_ns), stop_(stop), traced_(storage.traced), batches_(storage.batches) {
+        for (CameraBatch& p : traced_) p.times = times;
+    }
+
+    const Frame& f;
+    FrameError error;
+    bool with_paths = true;  ///< false: only the direct part of a frame in two parts (BatchRadiance)
+
+    [[nodiscard]] std::uint64_t samples_traced() const { return samples_; }
+    [[nodiscard]] std::uint64_t paths_traced() const { return paths_; }
+    [[nodiscard]] std::uint64_t met() const { return met_; }
+    [[nodiscard]] std::uint64_t separate() const { return separate_; }
+    [[nodiscard]] std::uint64_t rays_traced(std::uint64_t CameraBatch::*of = &CameraBatch::rays_traced) const {
+        std::uint64_t sum = 0;
+        for (const CameraBatch& p : traced_) sum += p.*of;
+        return sum;
+    }
+    void read_clock() {
+        if (until_ns_ != PassLimit{}.until_ns && now_ns() >= until_ns_)
+            stop_.store(true, std::memory_order_relaxed);
+    }
+
+    /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: the pixel's index in the tile.
+    /// Paths are traced together for up to kMaxPixelSamples samples per pixel, so that neighbours can reuse them.
+    /// Calls `sink(batch, batch, light)` for the samples in order.
+    template <class Begin, class End, class Sink>
+    void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Sink&& sink) {
+        set_centres(false);
+        const std::uint32_t most = f.sun_only || !with_paths ? PixelRange::kAll : kMaxPixelSamples;
+        bool left = true;
+        for (std::uint32_t done = 0; left; done += most) {
+            left = false;
+            tile.each_pixel([&](int x, int y, std::size_t at) {
+                const PixelRange range{begin(at), end(at)};
+                const auto number = static_cast<std::uint32_t>(y * image_width + x);
+                left = left || range.size() > done + most;
+                for (std::uint32_t s = range.from(done); s < range.from(done + most); ++s)
+                    add(tile, x, y, at, number, s, sink);
+            });
+            finish(tile, sink);
+        }
+    }
+
+    /// Traces the centres of the pixels that represent squares of `stride` pixels, except those of an earlier pass
+    /// of stride `made` (0: none).
+    template <class Sink>
+    void centres(const Tile& tile, int width, int height, int stride, int made, Sink&& sink) {
+        set_centres(true);
+        const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstCentre;
+        if (stride == 1 && made == 0 && tile.whole()) {
+            for (int block = 0; block < 4; ++block) {
+                put_block(tile, block, first, width, batches_[full_]);
+                trace(tile);
+                if (full_ == traced_.size()) light(sink);
+            }
+            light(sink);
+            return;
+        }
+        tile.each_pixel([&](int x, int y, std::size_t at) {
+            if (!represents(x, width, stride) || !represents(y, height, stride)) return;
+            if (made > 0 && represents(x, width, made) && represents(y, height, made)) return;
+            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, sink);
+        });
+        finish(tile, sink);
+    }
+    /// The same, stored in the G-buffer.
+    void centres(const Tile& tile, int width, int height, int stride, int made, GBuffer& g_buffer) {
+        centres(tile, width, height, stride, made,
+                [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& l) {
+                    g_buffer.store(f, p, l, b.place, tile.index);
+                });
+    }
+
+private:
+    /// A range of a pixel's sample sequence.
+    struct PixelRange {
+        static constexpr std::uint32_t kAll = ~0u;
+        std::uint32_t begin, end;
+        [[nodiscard]] std::uint32_t size() const { return end - begin; }
+        [[nodiscard]] std::uint32_t from(std::uint32_t n) const { return begin + std::min(n, size()); }
+    };
+    template <class Sink>
+    void add(const Tile& tile, int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample,
+             Sink&& sink) {
+        SampleBatch& b = batches_[full_];
+        const std::size_t i = b.samples.n++;
+        b.samples.x[i] = x, b.samples.y[i] = y;
+        b.samples.number[i] = number, b.samples.sample[i] = sample;
+        b.place[i] = static_cast<std::uint8_t>(at);
+        if (b.samples.n < kLanes) return;
+        trace(tile);
+        if (full_ == traced_.size()) light(sink);
+    }
+    void trace(const Tile& tile) {
+        SampleBatch& b = batches_[full_];
+        if (stop_.load(std::memory_order_relaxed)) b.samples.n = 0;
+        if (b.samples.n == 0) return;
+        CameraBatch& p = traced_[full_++];
+        trace_rays(f, b.samples, tile.bodies, p);
+        const std::uint32_t all = lanes_below(b.samples.n);
+        b.direct_lanes = f.sun_only || f.separate_sun ? all : 0;
+        b.path_lanes = f.sun_only || !with_paths ? 0 : all;
+        if (f.separate_sun && with_paths)
+            for_each_lane(all, [&](std::size_t i) {
+                if (!has_path(b.samples.sample[i])) b.path_lanes &= ~(1u << i);
+                p.sample[i] = paths_of(b.samples.sample[i]);
+            });
+        p.path_lanes = b.path_lanes;
+    }
+    template <class Sink>
+    void light(Sink&& sink) {
+        std::array<BatchRadiance, kMaxBatches> lights;
+        if (full_ > 0) f.integrator.radiance(f, traced_.first(full_), lights);
+        for (std::size_t k = 0; k < full_; ++k) {
+            sink(batches_[k], traced_[k], lights[k]);
+            samples_ += batches_[k].samples.n;
+            if (f.separate_sun) {
+                met_ += static_cast<std::uint64_t>(std::popcount(traced_[k].hits.met));
+                separate_ += static_cast<std::uint64_t>(std::popcount(traced_[k].first.lanes));
+            }
+            if (!f.sun_only) paths_ += static_cast<std::uint64_t>(std::popcount(batches_[k].path_lanes));
+            batches_[k].samples.n = 0;
+            if (++lit_ % kBatchesPerClockRead == 0) read_clock();
+        }
+        full_ = 0;
+    }
+    template <class Sink>
+    void finish(const Tile& tile, Sink&& sink) {
+        trace(tile);
+        light(sink);
+    }
+    void set_centres(bool centres) {
+        for (SampleBatch& b : batches_) b.samples.centre = centres;
+    }
+    /// The centres of 4 x 4 pixels, a whole batch.
+    static void put_block(const Tile& tile, int block, std::uint32_t first, int width, SampleBatch& b) {
+        const int x = tile.x + block % 2 * kBlock, y = tile.y + block / 2 * kBlock;
+        for (int i = 0; i < static_cast<int>(kLanes); ++i) {
+            const auto lane = static_cast<std::size_t>(i);
+            b.samples.x[lane] = x + i % kBlock, b.samples.y[lane] = y + i / kBlock;
+            b.samples.number[lane] =
+                first + static_cast<std::uint32_t>(b.samples.y[lane] * width + b.samples.x[lane]);
+            b.samples.sample[lane] = 0;
+            b.place[lane] = static_cast<std::uint8_t>(block * static_cast<int>(kLanes) + i);
+        }
+        b.samples.n = kLanes;
+    }
+
+    const std::int64_t until_ns_;
+    std::atomic<bool>& stop_;  ///< aborts the pass; read often, because a tile may hold many samples
+    const std::span<CameraBatch> traced_;
+    const std::span<SampleBatch> batches_;
+    std::size_t full_ = 0;  ///< number of full batches
+    std::uint64_t samples_ = 0, paths_ = 0, met_ = 0, separate_ = 0;
+    std::uint32_t lit_ = 0;  ///< number of batches shaded so far
+};
+
+// From a tile's samples to the image.
+
+inline std::size_t index_of(int x, int y, int width) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
+
+/// The block of a tile's pixels that starts at (x, y) in the tile.
+template <class Tile>
+PixelBlock block_of(const Tile& t, int x, int y) {
+    PixelBlock b;
+    b.x_first = t.x + x, b.y_first = t.y + y;
+    b.width = std::min(kBlock, t.width - x), b.height = std::min(kBlock, t.height - y);
+    for (int py = b.y_first; py < b.y_first + b.height; ++py)
+        for (int px = b.x_first; px < b.x_first + b.width; ++px) b.x[b.n] = px, b.y[b.n] = py, ++b.n;
+    return b;
+}
+
+template <class Tile>
+void add_subpixel_light(const Frame& f, const Tile& t, RadianceImage& out, std::vector<float>* variance) {
+    if (!f.subpixel_bodies.any()) return;
+    for (int y = 0; y < t.height; y += kBlock)
+        for (int x = 0; x < t.width; x += kBlock) add_subpixel_bodies(f, block_of(t, x, y), out, variance);
+}
+
+/// Adds the variance of each pixel's mean to `variance`: that of independent samples, block by block, times the
+/// tile's VarianceRatio. Pixels without samples add nothing; all others have the same number.
+template <class Tile>
+void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const PerPixel<PixelMeans>& means,
+                   PixelMean PixelMeans::*part, int image_width, std::vector<float>& variance) {
+    PerPixel<double> independent{};
+    std::size_t sampled = 0;
+    for (int y = 0; y < t.height; y += kBlock)
+        for (int x = 0; x < t.width; x += kBlock) {
+            const PixelBlock block = block_of(t, x, y);
+            Lanes<std::size_t> place;
+            Lanes<PixelSamples> of_block;
+            Lanes<double> of_means;
+            std::size_t n = 0;
+            for (std::size_t i = 0; i < block.n; ++i) {
+                place[n] = place_in_tile(block.x[i] - t.x, block.y[i] - t.y);
+                of_block[n] = spread[place[n]];
+                if (of_block[n].count() > 0) ++n;
+            }
+            if (n == 0) continue;
+            sampled += n;
+            variances_of_means(std::span(of_block).first(n), of_means);
+            for (std::size_t i = 0; i < n; ++i) independent[place[i]] = of_means[i];
+        }
+    if (sampled == 0) return;
+    VarianceRatio ratio;
+    t.each_pixel([&](int, int, std::size_t at) { ratio.add(means[at].*part, independent[at]); });
+    // The steps of a few pixels may be small by chance.
+    constexpr double kPixelsAsIndependent = 4;
+    const auto n = static_cast<double>(sampled);
+    const bool all = sampled == static_cast<std::size_t>(t.width * t.height);
+    const double value =
+        all ? ratio.value() : (n * ratio.value() + kPixelsAsIndependent) / (n + kPixelsAsIndependent);
+    t.each_pixel([&](int x, int y, std::size_t at) {
+        variance[index_of(x, y, image_width)] += static_cast<float>(value * independent[at]);
+    });
+}
+
+/// Sets the variance where pixels have different numbers of samples, or show their centres.
+template <class Tile>
+void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileContrast& contrast, int image_width,
+                   std::vector<float>& variance) {
+    const auto of_path = [&](std::size_t at) {
+        const bool alone = means[at].direct.count() == 0;
+        return contrast.reused[at] + (alone ? contrast.edge[at] + std::max(contrast.noise[at], 0.0f) : 0);
+    };
+    const auto of_direct = [&](std::size_t at) { return contrast.edge[at] + std::max(contrast.noise[at], 0.0f); };
+    const auto of_mean = [](const PixelMean& mean, float one) {
+        return mean.count() == 0 ? 0 : static_cast<double>(one) / mean.count();
+    };
+    VarianceRatio ratio_of_direct, ratio_of_path;
+    t.each_pixel([&](int, int, std::size_t at) {
+        ratio_of_direct.add(means[at].direct, of_mean(means[at].direct, of_direct(at)));
+        ratio_of_path.add(means[at].path, of_mean(means[at].path, of_path(at)));
+    });
+    const double direct = ratio_of_direct.value(), path = ratio_of_path.value();
+    // Contrasts do not see anything between the pixels' centres, such as a glint; the steps do.
+    const auto at_least = [](const PixelMean& mean, double expected) {
+        if (mean.count() < 2) return expected;
+        return std::max(expected, static_cast<double>(mean.step()) * static_cast<double>(mean.step()));
+    };
+    t.each_pixel([&](int x, int y, std::size_t at) {
+        const auto& [d, p] = means[at];
+        const double sampled =
+            at_least(d, direct * of_mean(d, of_direct(at))) + at_least(p, path * of_mean(p, of_path(at)));
+        variance[index_of(x, y, image_width)] =
+            means[at].count() > 0 ? static_cast<float>(sampled) : contrast.centre[at];
+    });
+}
+
+inline Rgb radiance_at(const GBufferTile& tile, std::size_t place) {
+    return {tile.r[place], tile.g[place], tile.b[place]};
+}
+
+/// Prefetches the memory of a tile's pixels.
+template <class Tile>
+void prefetch_pixels(const Tile& t, const RadianceImage& out) {
+    constexpr int kPixelsPerLine = 64 / static_cast<int>(sizeof(Rgb));
+    for (int y = 0; y < t.height; ++y)
+        for (int x = 0; x < t.width; x += kPixelsPerLine)
+            __builtin_prefetch(&out.pixels[index_of(t.x + x, t.y + y, out.width)], 1);
+}
+
+/// Four pixels from separate bands, interleaved.
+inline std::array<Rgb, kBlock> interleave(const float* red, const float* green, const float* blue) {
+    using Four [[gnu::vector_size(16)]] = float;
+    static_assert(kBlock == 4 && sizeof(Rgb) == 3 * sizeof(float));
+    Four r, g, b;
+    std::memcpy(&r, red, sizeof r), std::memcpy(&g, green, sizeof g), std::memcpy(&b, blue, sizeof b);
+    const Four low = __builtin_shufflevector(r, g, 0, 4, 1, 5), high = __builtin_shufflevector(r, g, 2, 6, 3, 7);
+    const std::array<Four, 3> mixed{
+        __builtin_shufflevector(low, b, 0, 1, 4, 2),
+        __builtin_shufflevector(__builtin_shufflevector(g, b, 1, 5, 1, 5), high, 0, 1, 4, 5),
+        __builtin_shufflevector(high, b, 6, 2, 3, 7)};
+    return std::bit_cast<std::array<Rgb, kBlock>>(mixed);
+}
+
+/// Writes a tile's pixels, given band by band, to the image.
+template <class Tile>
+void put_pixels(const Tile& t, const PerPixel<float>& r, const PerPixel<float>& g, const PerPixel<float>& b,
+                RadianceImage& out) {
+    for (int y = 0; y < t.height; ++y)
+        for (int x = 0; x < t.width; x += kBlock) {
+            const std::size_t at = place_in_tile(x, y);
+            const std::array<Rgb, kBlock> pixels = interleave(&r[at], &g[at], &b[at]);
+            Rgb* const to = &out.pixels[index_of(t.x + x, t.y + y, out.width)];
+            if (x + kBlock <= t.width)
+                std::copy(pixels.begin(), pixels.end(), to);
+            else
+                std::copy_n(pixels.begin(), t.width - x, to);
+        }
+}
+
+/// Adds the samples of a batch to their pixels.
+inline void add_samples(const SampleBatch& b, const BatchRadiance& light, PerPixel<PixelMeans>& means) {
+    for_each_lane(b.direct_lanes, [&](std::size_t i) { means[b.place[i]].direct.add(light.direct[i]); });
+    for_each_lane(b.path_lanes, [&](std::size_t i) { means[b.place[i]].path.add(light.path[i]); });
+}
+
+}  // namespace narpa

@@ -1,0 +1,256 @@
+#include "renderer/scene_file/lidar_description.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "base/constants.h"
+#include "base/csv.h"
+#include "base/read_number.h"
+#include "protocols/lidar/pattern_lidar.h"
+#include "renderer/keys/based_on.h"
+#include "renderer/keys/toml_reader.h"
+
+namespace narpa {
+namespace {
+
+constexpr Range kAzimuth_deg{.low = -720, .high = 720}, kElevation_deg{.low = -90, .high = 90},
+    kPhase{.low = 0, .high = 1, .high_open = true};
+
+std::vector<PatternShot> read_beams(std::vector<TableReader> tables) {
+    std::vector<PatternShot> shots;
+    for (TableReader& table : tables) {
+        table.require("azimuth_deg", "an angle, clockwise from y");
+        table.require("elevation_deg", "an angle above the plane of x and y");
+        shots.push_back({.azimuth_rad = kRadPerDeg * table.number("azimuth_deg", kAzimuth_deg).value_or(0),
+                         .elevation_rad = kRadPerDeg * table.number("elevation_deg", kElevation_deg).value_or(0),
+                         .phase = table.number("phase", kPhase).value_or(0),
+                         .beam = static_cast<int>(shots.size())});
+        table.finish();
+    }
+    return shots;
+}
+
+/// Whether cells have equal steps of the tangent or of the angle across the field of view.
+enum class Spacing : std::uint8_t { tangents, angles };
+enum class Scan : std::uint8_t { flash, rows, columns };
+
+/// The field's angle at cell i of n, from -1/2 of the field to +1/2.
+double at_cell(Spacing spacing, double field_rad, std::int64_t i, std::int64_t n) {
+    const double place = (static_cast<double>(i) + 0.5) / static_cast<double>(n) - 0.5;
+    return spacing == Spacing::angles ? place * field_rad : 2 * place * std::tan(0.5 * field_rad);
+}
+
+struct Grid {
+    std::int64_t columns = 1, rows = 1;
+    double horizontal_rad = 0, vertical_rad = 0;
+    Spacing spacing = Spacing::tangents;
+    Scan scan = Scan::flash;
+    bool two_way = false;
+    double scan_share = 1;  ///< of the frame's period
+};
+
+std::vector<PatternShot> shots_of(const Grid& g) {
+    std::vector<PatternShot> shots;
+    const std::int64_t count = g.columns * g.rows;
+    const bool by_columns = g.scan == Scan::columns;
+    const std::int64_t length = by_columns ? g.rows : g.columns;
+    for (std::int64_t i = 0; i < count; ++i) {
+        const std::int64_t line = i / length, along = i % length;
+        const std::int64_t place = g.two_way && line % 2 == 1 ? length - 1 - along : along;
+        const std::int64_t column = by_columns ? line : place, row = by_columns ? place : line;
+        const double x = at_cell(g.spacing, g.horizontal_rad, column, g.columns),
+                     z = -at_cell(g.spacing, g.vertical_rad, row, g.rows);
+        const bool tangents = g.spacing == Spacing::tangents;
+        shots.push_back({.azimuth_rad = tangents ? std::atan(x) : x,
+                         .elevation_rad = tangents ? std::atan2(z, std::hypot(1, x)) : z,
+                         .phase = g.scan == Scan::flash
+                                      ? 0
+                                      : g.scan_share * static_cast<double>(i) / static_cast<double>(count),
+                         .beam = static_cast<int>(row)});
+    }
+    return shots;
+}
+
+void read_grid(TableReader table, LidarPattern& pattern) {
+    static constexpr std::array<std::pair<std::string_view, Spacing>, 2> kSpacings{
+        {{"tangents", Spacing::tangents}, {"angles", Spacing::angles}}};
+    static constexpr std::array<std::pair<std::string_view, Scan>, 3> kScans{
+        {{"flash", Scan::flash}, {"rows", Scan::rows}, {"columns", Scan::columns}}};
+    constexpr std::int64_t kMaxCells = 65'535;
+    Grid g;
+    for (const char* key : {"columns", "rows"}) table.require(key, "a count");
+    for (const char* key : {"fov_horizontal_deg", "fov_vertical_deg"}) table.require(key, "an angle");
+    g.columns = table.integer("columns", 1, kMaxCells).value_or(1);
+    g.rows = table.integer("rows", 1, kMaxCells).value_or(1);
+    g.spacing = table.choice<Spacing>("spacing", kSpacings).value_or(Spacing::tangents);
+    const double most = g.spacing == Spacing::tangents ? 170 : 360;
+    const auto fov = [&](const char* key, double limit) {
+        return kRadPerDeg * table.number(key, {.low = 0, .high = limit, .low_open = true}).value_or(1);
+    };
+    g.horizontal_rad = fov("fov_horizontal_deg", most);
+    g.vertical_rad = fov("fov_vertical_deg", std::min(most, 180.0));
+    g.scan = table.choice<Scan>("scan", kScans).value_or(Scan::flash);
+    g.two_way = table.boolean("two_way").value_or(false);
+    g.scan_share = table.number("scan_share", {.low = 0, .high = 1, .low_open = true}).value_or(1);
+    if (g.scan == Scan::flash)
+        for (const char* key : {"two_way", "scan_share"}) table.refuse(key, "all shots of a flash fire at once");
+    table.finish();
+    const auto max_shots = static_cast<std::int64_t>(LidarPattern::kMaxShots);
+    if (g.columns * g.rows > max_shots) {
+        table.fail("columns",
+                   fmt::format("{} x {} shots a frame, expected at most {}", g.columns, g.rows, max_shots));
+        return;
+    }
+    pattern.shots = shots_of(g);
+    if (g.scan != Scan::flash) return;
+    const double h = 0.5 * g.horizontal_rad, v = 0.5 * g.vertical_rad;
+    if (g.spacing == Spacing::tangents)
+        pattern.lit = {LidarField::Kind::plane, std::tan(h), std::tan(v)};
+    else
+        pattern.lit = {LidarField::Kind::angles, h, v};
+}
+
+std::vector<PatternShot> read_spin(TableReader table) {
+    constexpr std::int64_t kMaxColumns = 65'536;
+    constexpr std::size_t kMaxBeams = 256;
+    table.require("columns", "a count: firings in a turn");
+    table.require("elevation_deg", "an array of angles, one for each laser");
+    const std::int64_t columns = table.integer("columns", 1, kMaxColumns).value_or(1);
+    const auto angles = [&](const char* key, std::size_t count, const Range& range) {
+        std::vector<double> all;
+        const toml::node* node = table.find(key);
+        const toml::array* array = node ? node->as_array() : nullptr;
+        if (node &&
+            (!array || array->empty() || array->size() > kMaxBeams || (count > 0 && array->size() != count)))
+            table.fail(key, count > 0 ? fmt::format("expected an array of {} numbers", count)
+                                      : fmt::format("expected an array of 1 to {} numbers", kMaxBeams));
+        else if (array)
+            all = table.numbers(key, {array->size()}, range).value_or(std::vector<double>(array->size()));
+        return all;
+    };
+    const std::vector<double> elevation_deg = angles("elevation_deg", 0, kElevation_deg);
+    std::vector<double> azimuth_deg = angles("azimuth_deg", elevation_deg.size(), {.low = -180, .high = 180});
+    azimuth_deg.resize(elevation_deg.size());
+    table.finish();
+    const auto shots = static_cast<std::size_t>(columns) * elevation_deg.size();
+    if (shots > LidarPattern::kMaxShots) {
+        table.fail("columns", fmt::format("{} shots a turn, expected at most {}", shots, LidarPattern::kMaxShots));
+        return {};
+    }
+    std::vector<PatternShot> all;
+    for (std::int64_t c = 0; c < columns; ++c)
+        for (std::size_t i = 0; i < elevation_deg.size(); ++i) {
+            const double turn = static_cast<double>(c) / static_cast<double>(columns);
+            all.push_back({.azimuth_rad = 2 * std::numbers::pi * turn + kRadPerDeg * azimuth_deg[i],
+                           .elevation_rad = kRadPerDeg * elevation_deg[i],
+                           .phase = turn,
+                           .beam = static_cast<int>(i)});
+        }
+    return all;
+}
+
+/// Reads a CSV file with a row for each shot.
+Result<std::vector<PatternShot>> read_shots(const std::string& file) {
+    constexpr std::string_view kHeader = "phase,azimuth_deg,elevation_deg,beam";
+    std::vector<PatternShot> shots;
+    const auto take = [&](std::string_view line, int number) -> Status {
+        std::array<double, 4> x{};
+        const auto cells = cells_of(line);
+        bool good = cells.size() == x.size() && shots.size() < LidarPattern::kMaxShots;
+        for (std::size_t i = 0; good && i < x.size(); ++i) good = read_number(trimmed(cells[i]), x[i]);
+        good = good && kPhase.holds(x[0]) && kAzimuth_deg.holds(x[1]) && kElevation_deg.holds(x[2]) && x[3] >= 0 &&
+               x[3] <= 65535 && x[3] == std::floor(x[3]);
+        if (!good)
+            return Error{fmt::format("expected {}: phase in [0, 1), angles within 720 and 90 deg, a beam of 0 to "
+                                     "65535; at most {} rows",
+                                     kHeader, LidarPattern::kMaxShots),
+                         file, number, 1};
+        if (!shots.empty() && x[0] < shots.back().phase)
+            return Error{"fires before the shot above it, expected the order of firing", file, number, 1};
+        shots.push_back({kRadPerDeg * x[1], kRadPerDeg * x[2], x[0], static_cast<int>(x[3])});
+        return Ok{};
+    };
+    if (Status read = read_csv_lines(file, kHeader, "shots of a LiDAR", "shot", take); !read) return read.error();
+    return shots;
+}
+
+void read_pattern(TableReader& root, TableReader& head, const std::string& file, LidarPattern& pattern) {
+    const bool grid = root.has("grid"), spin = root.has("spin"), beams = root.has("beam"),
+               shots = head.has("shots");
+    if (grid + spin + beams + shots != 1) {
+        head.fail("shots", "expected one of [grid], [spin], [[beam]] and shots = \"FILE.csv\" in [lidar]");
+        return;
+    }
+    if (auto table = grid ? root.table("grid") : std::nullopt) return read_grid(*table, pattern);
+    if (auto table = spin ? root.table("spin") : std::nullopt) pattern.shots = read_spin(*table);
+    if (beams) pattern.shots = read_beams(root.tables("beam"));
+    if (const auto named = shots ? head.text("shots") : std::nullopt) {
+        auto read = read_shots(beside(file, *named));
+        if (read)
+            pattern.shots = *std::move(read);
+        else
+            head.fail("shots", read.error().text());
+    }
+}
+
+void read_head(TableReader& head, LidarPattern& p) {
+    constexpr Range kRate{.low = 0, .high = 1e4, .low_open = true};
+    head.text("based_on");
+    head.require("name", "a text");
+    head.require("rate_hz", "frames a second");
+    head.require("range_max_m", "the rated range");
+    p.name = head.text("name").value_or("");
+    if (head.has("name") && (p.name.empty() || p.name.size() > 64))
+        head.fail("name", "expected 1 to 64 characters");
+    p.rate_hz_default = head.number("rate_hz", kRate).value_or(10);
+    p.rate_hz_min = head.number("rate_hz_min", kRate).value_or(p.rate_hz_default);
+    p.rate_hz_max = head.number("rate_hz_max", kRate).value_or(p.rate_hz_default);
+    p.range_resolution_m =
+        head.number("range_resolution_m", {.low = 0, .high = 1e3, .low_open = true}).value_or(1e-3);
+    p.range_m_default =
+        head.number("range_max_m", {.low = 0, .high = p.range_resolution_m * UINT32_MAX, .low_open = true})
+            .value_or(1);
+    p.velocity_resolution_m_s = head.number("velocity_resolution_m_s", {.low = 0, .high = 1e3}).value_or(0);
+    p.dual = head.boolean("dual").value_or(false);
+    p.latency_s = head.number("latency_s", {.low = 0, .high = LidarPattern::kLongest_s}).value_or(0);
+    p.data_port = static_cast<std::uint16_t>(head.integer("data_port", 1, 65535).value_or(p.data_port));
+}
+
+Result<LidarMake> read_description(const std::string& file) {
+    Problems problems(file);
+    auto pattern = std::make_shared<LidarPattern>();
+    try {
+        const auto table = parse_based_on(file, "lidar");
+        if (!table) return table.error();
+        TableReader root(*table, "the description", problems);
+        root.require("lidar", "a table [lidar]");
+        if (auto head = root.table("lidar")) {
+            read_head(*head, *pattern);
+            read_pattern(root, *head, file, *pattern);
+            head->finish();
+        }
+        root.finish();
+    } catch (const toml::parse_error& e) {
+        problems.add(e.source(), std::string(e.description()));
+    }
+    if (!problems.none()) return problems.first();
+    auto make = make_of(pattern);
+    if (!make) return Error{make.error().what, file};
+    return make;
+}
+
+}  // namespace
+
+Result<LidarMake> read_lidar_description(const std::string& file) {
+    try {
+        return read_description(file);
+    } catch (const std::exception& e) {
+        return Error{fmt::format("cannot be read: {}", e.what()), file};
+    }
+}
+
+}  // namespace narpa

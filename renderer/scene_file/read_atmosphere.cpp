@@ -1,0 +1,129 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "renderer/atmosphere/air.h"
+#include "renderer/scene_file/scene_parts.h"
+
+namespace narpa {
+namespace {
+
+using Planet = AirDescription::Planet;
+constexpr std::array<std::pair<std::string_view, Planet>, 2> kPlanets{
+    {{"earth", Planet::earth}, {"mars", Planet::mars}}};
+constexpr std::array<std::pair<std::string_view, int>, 1> kSkies{{{"hosek-wilkie", 0}}};
+constexpr Range kTurbidity{.low = 1, .high = 10};
+constexpr Range kAirHeight{.low = 100, .high = 1e5};
+
+/// Radius of the sphere with the body's volume; nullopt for a mesh.
+std::optional<double> mean_radius_m(const Body& body) {
+    if (const auto* s = std::get_if<Sphere>(&body.shape)) return s->radius_m;
+    if (const auto* e = std::get_if<Ellipsoid>(&body.shape))
+        return std::cbrt(e->semi_axes_m.x * e->semi_axes_m.y * e->semi_axes_m.z);
+    return std::nullopt;
+}
+
+/// Index of the body that is named; -1 and a problem otherwise.
+int planet_body(TableReader& table, const std::vector<Body>& bodies) {
+    table.require("body", "the name of the [[body]] that the air surrounds");
+    const auto name = table.text("body");
+    if (!name) return -1;
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (bodies[i].name == *name) return static_cast<int>(i);
+    table.fail("body", fmt::format("there is no body \"{}\", expected the name of a [[body]]", *name));
+    return -1;
+}
+
+/// Whether the material names a texture. Texture files are opened after everything else.
+bool names_texture(const SceneReading& reading, int material) {
+    return std::any_of(reading.textures.begin(), reading.textures.end(),
+                       [&](const NamedTexture& t) { return t.material == material; });
+}
+
+void read_ground(TableReader& table, const Body& body, const SceneReading& reading, AirDescription& air) {
+    const std::optional<double> own = mean_radius_m(body);
+    const auto radius = table.number("ground_radius_m", {.low = 1e5, .high = 1e9});
+    if (own && radius)
+        table.fail("ground_radius_m", "the body has a radius of its own, expected none here");
+    else if (own && !(*own >= 1e5 && *own <= 1e9))
+        table.fail("body", fmt::format("its radius is {} m, expected a planet, of 1e5 to 1e9 m", *own));
+    else if (!own && !table.has("ground_radius_m"))
+        table.require("ground_radius_m", "the radius of the ground about the body's origin: the body is no sphere");
+    air.ground_radius_m = own.value_or(radius.value_or(air.ground_radius_m));
+    if (own && !table.has("ground_albedo")) {
+        const int material = std::holds_alternative<Sphere>(body.shape) ? std::get<Sphere>(body.shape).material
+                                                                        : std::get<Ellipsoid>(body.shape).material;
+        const Material& m = reading.scene.materials[static_cast<std::size_t>(material)];
+        if (m.kind == Material::Kind::lambert && !names_texture(reading, material))
+            air.ground_albedo = std::min(1.0, static_cast<double>(mean_band(m.diffuse)));
+    }
+    air.ground_albedo = table.number("ground_albedo", kUnit).value_or(air.ground_albedo);
+}
+
+void read_air(TableReader& table, AirDescription& air) {
+    air.top_m = table.number("top_m", {.low = 1e4, .high = 5e5}).value_or(air.top_m);
+    air.gas_height_m = table.number("gas_height_m", kAirHeight).value_or(air.gas_height_m);
+    air.aerosol_height_m = table.number("aerosol_height_m", kAirHeight).value_or(air.aerosol_height_m);
+    air.gas_amount = table.number("gas_amount", {.low = 0, .high = 100}).value_or(air.gas_amount);
+    air.aerosol_lidar_ratio_sr = table.number("lidar_ratio_sr", {.low = 1, .high = 1000}).value_or(0);
+    const bool earth = air.planet == Planet::earth;
+    if (earth) {
+        table.refuse("dust_depth", "belongs to planet = \"mars\"; the Earth's aerosol has a \"turbidity\"");
+    } else {
+        for (const std::string_view key : {"turbidity", "ozone_du"})
+            table.refuse(key, "belongs to planet = \"earth\"; the dust of Mars has a \"dust_depth\"");
+    }
+    air.turbidity = table.number("turbidity", kTurbidity).value_or(air.turbidity);
+    air.ozone_du = table.number("ozone_du", {.low = 0, .high = 1000}).value_or(air.ozone_du);
+    air.aerosol_depth = table.number("dust_depth", {.low = 0, .high = 10}).value_or(air.aerosol_depth);
+}
+
+void read_planet_air(TableReader& root, SceneReading& reading) {
+    auto table = root.table("atmosphere");
+    if (!table) return;
+    Atmosphere a;
+    Scene& scene = reading.scene;
+    a.body = planet_body(*table, scene.bodies);
+    const Planet planet = table->choice<Planet>("planet", kPlanets).value_or(Planet::earth);
+    a.air = planet == Planet::earth ? earth_air() : mars_air();
+    if (a.body >= 0) read_ground(*table, scene.bodies[static_cast<std::size_t>(a.body)], reading, a.air);
+    read_air(*table, a.air);
+    a.samples_per_band =
+        static_cast<int>(table->integer("samples_per_band", 1, Air::kMaxPerBand).value_or(a.samples_per_band));
+    a.steps = static_cast<int>(table->integer("steps", 4, 32).value_or(a.steps));
+    table->finish();
+    if (a.body >= 0) scene.atmosphere = a;
+}
+
+void read_sky(TableReader& root, SceneReading& reading) {
+    auto table = root.table("sky");
+    if (!table) return;
+    table->require("model", "\"hosek-wilkie\"");
+    (void)table->choice<int>("model", kSkies);
+    AnalyticSky sky;
+    sky.up = table->direction("up").value_or(sky.up);
+    sky.turbidity = table->number("turbidity", kTurbidity).value_or(sky.turbidity);
+    sky.ground_albedo = table->number("ground_albedo", kUnit).value_or(sky.ground_albedo);
+    table->finish();
+    if (!reading.scene.sun) {
+        root.fail("sky", "a sky is lit by the Sun, expected a [sun]");
+    } else if (dot(sky.up, normalized(reading.scene.sun->direction)) < 0) {
+        root.fail("sky",
+                  "the Sun stands below this sky's horizon, where its model ends; expected a Sun above, or an "
+                  "[atmosphere], which has twilight");
+    }
+    for (const std::string_view other : {"atmosphere", "ambient"})
+        root.refuse(other, "the scene has a [sky] too, expected one of the two");
+    reading.scene.sky = sky;
+}
+
+}  // namespace
+
+void read_atmosphere(TableReader& root, SceneReading& reading) {
+    read_planet_air(root, reading);
+    read_sky(root, reading);
+}
+
+}  // namespace narpa

@@ -1,0 +1,136 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "base/constants.h"
+#include "renderer/ephemeris/iau_rotation.h"
+#include "renderer/scene_file/scene_parts.h"
+
+namespace narpa {
+
+namespace {
+
+/// CAN identifiers: each body has sixteen, from a base that is a multiple of 16.
+constexpr std::int64_t kIdsPerBody = 16, kLastBaseId = 0x5f0;
+
+constexpr Range kBodyLength{.low = 0, .high = 1e15, .low_open = true};
+
+Sphere read_sphere(TableReader& table, int material) {
+    Sphere sphere{.material = material};
+    table.require("radius_m", "a number > 0");
+    sphere.radius_m = table.number("radius_m", kBodyLength).value_or(sphere.radius_m);
+    table.finish();
+    return sphere;
+}
+
+Ellipsoid read_ellipsoid(TableReader& table, int material) {
+    Ellipsoid ellipsoid{.material = material};
+    table.require("semi_axes_m", "[a, b, c], the half lengths along the body's x, y and z");
+    ellipsoid.semi_axes_m = table.vec3("semi_axes_m", kBodyLength).value_or(ellipsoid.semi_axes_m);
+    table.finish();
+    return ellipsoid;
+}
+
+NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<int> material,
+                     const SceneReading& reading) {
+    if (file.empty()) table.fail("mesh", "expected the name of a mesh file");
+    return {.body = reading.scene.bodies.size(),
+            .path = (reading.folder / file).string(),
+            .scale = table.number("scale", {.low = 0, .high = 1e12, .low_open = true}).value_or(1),
+            .crease_rad = kRadPerDeg * table.number("crease_angle_deg", {.low = 0, .high = 180}).value_or(0),
+            .material = material,
+            .place = table.place("mesh")};
+}
+
+/// Records a problem unless the body has exactly one shape.
+void check_one_shape(TableReader& table) {
+    const char* first = nullptr;
+    for (const char* key : {"mesh", "sphere", "ellipsoid", "dem"}) {
+        if (!table.has(key)) continue;
+        if (first) table.fail(key, fmt::format("this body has a {} already, expected one of the two", first));
+        if (!first) first = key;
+    }
+    if (!first)
+        table.require("mesh",
+                      "mesh = \"FILE\" or sphere = {radius_m = ...} or ellipsoid = {semi_axes_m = [a, b, c]} or "
+                      "dem = \"FILE\"");
+}
+
+void read_shape(TableReader& table, Body& body, SceneReading& reading) {
+    const std::optional<int> own = read_material(table, body.name, reading);
+    const auto material = [&] { return own ? *own : add_grey_material(body.name, reading.scene); };
+    const auto mesh = table.text("mesh");
+    auto sphere = table.table("sphere"), ellipsoid = table.table("ellipsoid");
+    check_one_shape(table);
+    if (!table.has("mesh")) {
+        table.refuse("scale", "belongs to a mesh; other shapes have their size in metres");
+        table.refuse("crease_angle_deg", "belongs to a mesh");
+    }
+    if (mesh) {
+        reading.meshes.push_back(named_mesh(table, *mesh, own, reading));
+    } else if (sphere) {
+        body.shape = read_sphere(*sphere, material());
+    } else if (ellipsoid) {
+        body.shape = read_ellipsoid(*ellipsoid, material());
+    } else if (table.has("dem")) {
+        read_dem(table, material(), reading);
+    }
+}
+
+void read_can_id(TableReader& table, Body& body, const std::vector<Body>& others) {
+    const auto id = table.integer("can_id", 0, kLastBaseId);
+    if (!id) return;
+    if (*id % kIdsPerBody != 0) {
+        table.fail("can_id",
+                   fmt::format("0x{:03x} is not a base identifier, expected a multiple of 16: a body takes "
+                               "sixteen identifiers from there",
+                               *id));
+        return;
+    }
+    body.can_id = static_cast<std::uint32_t>(*id);
+    for (const Body& other : others)
+        if (other.can_id == body.can_id)
+            table.fail("can_id",
+                       fmt::format("0x{:03x} is taken by body \"{}\", expected one of its own", *id, other.name));
+}
+
+/// Attitude and rate of a planet, moon or asteroid at the scene's epoch.
+void read_rotation(TableReader& table, Motion& motion, const SceneReading& reading) {
+    const auto name = table.text("rotation");
+    if (!name) return;
+    for (const char* key : {"attitude_wxyz", "rate_rad_s"}) table.refuse(key, "follows from rotation");
+    if (!reading.has_epoch) table.fail("rotation", "expected an epoch in [scene], at which the body stands");
+    if (const auto turning = body_rotation_of(*name, reading.scene.epoch_unix_ns)) {
+        motion.T_world_body.q = turning->q_icrs_body;
+        motion.rate_rad_s = turning->rate_rad_s;
+        return;
+    }
+    table.fail("rotation", fmt::format("\"{}\" is not known here, expected one of {}", *name,
+                                       fmt::join(kRotatingBodies, ", ")));
+}
+
+void read_motion(TableReader& table, Motion& motion) {
+    motion.T_world_body.t = table.vec3("position_m").value_or(Vec3{});
+    motion.T_world_body.q = table.attitude("attitude_wxyz").value_or(Quat{});
+    motion.velocity_m_s = table.vec3("velocity_m_s").value_or(Vec3{});
+    motion.rate_rad_s = table.vec3("rate_rad_s").value_or(Vec3{});
+}
+
+}  // namespace
+
+void read_bodies(TableReader& root, SceneReading& reading) {
+    std::vector<std::string> names;
+    for (TableReader& table : root.tables("body")) {
+        Body body;
+        body.name = read_name(table, names);
+        read_shape(table, body, reading);
+        read_motion(table, body.initial);
+        read_rotation(table, body.initial, reading);
+        read_orbit(table, body);
+        read_can_id(table, body, reading.scene.bodies);
+        table.finish();
+        reading.scene.bodies.push_back(std::move(body));
+    }
+    root.require("body", "at least one [[body]]");
+}
+
+}  // namespace narpa

@@ -1,0 +1,170 @@
+// `dem` of a body: a digital elevation model, read as terrain (docs/terrain.md).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/file_bytes.h"
+#include "renderer/assets/dem_process.h"
+#include "renderer/scene_file/scene_parts.h"
+
+namespace narpa {
+
+namespace {
+
+constexpr Range kDemFactor{.low = -1e9, .high = 1e9};
+constexpr Range kDemLength{.low = 0, .high = 1e9, .low_open = true};
+constexpr std::size_t kMaxPathPoints = 256;
+constexpr double kPixelsPerRadWithoutCamera = 1000;
+
+constexpr std::array<std::pair<std::string_view, DemRequest::On>, 3> kGrounds{
+    {{"plane", DemRequest::On::plane},
+     {"ellipsoid", DemRequest::On::ellipsoid},
+     {"tangent", DemRequest::On::tangent}}};
+constexpr std::array<std::pair<std::string_view, bool>, 2> kHeightKinds{{{"heights", false}, {"radii", true}}};
+
+TerrainDetail read_detail(TableReader& table) {
+    TerrainDetail d;
+    table.require("posts", "how many times finer than the DEM, 2 to 64");
+    d.refinement_factor = static_cast<int>(table.integer("posts", 2, 64).value_or(2));
+    // From 2.4 on, cells would hold more craters than DetailedSource draws.
+    d.craters = table.number("craters_per_m2", {.low = 0, .high = 1}).value_or(0);
+    d.rocks = table.number("rocks_share", {.low = 0, .high = 0.5}).value_or(0);
+    d.seed = static_cast<std::uint64_t>(table.integer("seed", 0, 1'000'000'000).value_or(0));
+    table.finish();
+    return d;
+}
+
+std::vector<Vec3> read_seen_from(TableReader& table, std::string_view key) {
+    const toml::node* node = table.find(key);
+    if (!node) return {};
+    std::vector<Vec3> path;
+    const toml::array* points = node->as_array();
+    for (std::size_t i = 0; points && i < points->size(); ++i) {
+        const toml::array* p = points->get(i)->as_array();
+        Vec3 point{NAN, NAN, NAN};
+        for (std::size_t k = 0; p && p->size() == 3 && k < 3; ++k)
+            point[static_cast<int>(k)] = p->get(k)->value<double>().value_or(NAN);
+        path.push_back(point);
+    }
+    const bool good = !path.empty() && path.size() <= kMaxPathPoints &&
+                      std::all_of(path.begin(), path.end(), [](const Vec3& p) { return norm(p) < 1e15; });
+    if (good) return path;
+    table.fail(key, fmt::format("expected [[x, y, z], ...], 1 to {} points in metres in the body's frame",
+                                kMaxPathPoints));
+    return {};
+}
+
+DemRequest read_request(TableReader& table, const SceneReading& reading) {
+    DemRequest r;
+    table.require("file", "the name of a DEM");
+    const std::string file = table.text("file").value_or("");
+    if (table.has("file") && file.empty()) table.fail("file", "expected the name of a DEM");
+    r.path = (reading.folder / file).string();
+    r.on = table.choice<DemRequest::On>("on", kGrounds).value_or(r.on);
+    r.radii = table.choice<bool>("has", kHeightKinds).value_or(false);
+    r.scale = table.number("scale", kDemFactor).value_or(r.scale);
+    r.offset_m = table.number("offset_m", kDemFactor).value_or(r.offset_m);
+    r.no_data = table.number("no_data").value_or(r.no_data);
+    r.post_spacing_m = table.number("post_spacing_m", kDemLength).value_or(r.post_spacing_m);
+    if (const auto axes = table.pair("ellipsoid_m", kDemLength))
+        r.equatorial_m = (*axes)[0], r.polar_m = (*axes)[1];
+    r.options.error_px = table.number("error_px", {.low = 0.001, .high = 1000}).value_or(r.options.error_px);
+    r.options.error_m = table.number("error_m", kDemLength).value_or(r.options.error_m);
+    r.options.seen_from = read_seen_from(table, "seen_from_m");
+    r.options.budget_bytes = static_cast<std::uint64_t>(table.integer("budget_mib", 1, 1 << 20).value_or(1024))
+                             << 20;
+    if (auto detail = table.table("detail")) r.detail = read_detail(*detail);
+    table.finish();
+    return r;
+}
+
+Rigid3 initial_pose(int mount, const Scene& scene) {
+    return mount < 0 ? Rigid3{} : scene.bodies[static_cast<std::size_t>(mount)].initial.T_world_body;
+}
+
+/// Where the scene's sensors are at time 0, in the body's frame.
+std::vector<Vec3> places_of_sensors(const Scene& scene, std::size_t body) {
+    const Rigid3 T_body_world = inverse(scene.bodies[body].initial.T_world_body);
+    std::vector<Vec3> places;
+    for (const Camera& c : scene.cameras)
+        places.push_back(T_body_world * (initial_pose(c.mount, scene) * c.T_mount_camera.t));
+    for (const Lidar& l : scene.lidars)
+        places.push_back(T_body_world * (initial_pose(l.mount, scene) * l.T_mount_lidar.t));
+    return places;
+}
+
+/// Pixels per radian in the corner of the image, where a pinhole has most.
+double pixels_per_rad(const Camera& c) {
+    const double f = std::max(c.fx, c.fy), x = std::max(c.cx, c.width - 1 - c.cx) / c.fx,
+                 y = std::max(c.cy, c.height - 1 - c.cy) / c.fy;
+    return c.model ? f : f * (1 + x * x + y * y);
+}
+
+bool is_moving(int mount, const Scene& scene) {
+    if (mount < 0) return false;
+    const Body& b = scene.bodies[static_cast<std::size_t>(mount)];
+    return b.can_id.has_value() || norm(b.initial.velocity_m_s) > 0;
+}
+
+void take_sensors(DemRequest& r, std::size_t body, Scene& scene) {
+    double sharpest = 0;
+    for (const Camera& c : scene.cameras) sharpest = std::max(sharpest, pixels_per_rad(c));
+    r.options.pixels_per_rad = sharpest > 0 ? sharpest : kPixelsPerRadWithoutCamera;
+    if (!r.options.seen_from.empty()) return;
+    r.options.seen_from = places_of_sensors(scene, body);
+    const auto any_is_moving = [&](const auto& sensors) {
+        return std::any_of(sensors.begin(), sensors.end(),
+                           [&](const auto& s) { return is_moving(s.mount, scene); });
+    };
+    if (any_is_moving(scene.cameras) || any_is_moving(scene.lidars) || is_moving(static_cast<int>(body), scene))
+        scene.warnings.push_back(
+            fmt::format("body \"{}\": the terrain is as fine as the places of the sensors at time 0 need it; "
+                        "seen_from_m in its "
+                        "dem names the path that they will take",
+                        scene.bodies[body].name));
+}
+
+void load_dem(const NamedDem& named, SceneReading& reading) {
+    Scene& scene = reading.scene;
+    DemRequest request = named.request;
+    if (const Status plain = check_plain_file(request.path); !plain)
+        return reading.problems.add(named.place, "dem: " + plain.error().text());
+    take_sensors(request, named.body, scene);
+    Result<TerrainMesh> terrain = read_dem_in_process(request);
+    if (!terrain) return reading.problems.add(named.place, "dem: " + terrain.error().text());
+    if (terrain->summary.error_px > request.options.error_px)
+        scene.warnings.push_back(fmt::format(
+            "{}: a budget of {} MiB keeps the error of the terrain within {:.2g} px, not {:.2g} px", request.path,
+            request.options.budget_bytes >> 20, terrain->summary.error_px, request.options.error_px));
+    Mesh mesh;
+    mesh.name = request.path;
+    mesh.height_field = true;
+    mesh.origin_m = terrain->origin_m;
+    mesh.positions = std::move(terrain->positions), mesh.normals = std::move(terrain->normals);
+    mesh.uvs = std::move(terrain->uvs), mesh.faces = std::move(terrain->faces);
+    mesh.face_material.assign(mesh.faces.size(), static_cast<std::uint16_t>(named.material));
+    scene.bodies[named.body].shape = static_cast<int>(scene.meshes.size());
+    scene.meshes.push_back(std::move(mesh));
+}
+
+}  // namespace
+
+void read_dem(TableReader& body, int material, SceneReading& reading) {
+    NamedDem named{
+        .body = reading.scene.bodies.size(), .request = {}, .material = material, .place = body.place("dem")};
+    const toml::node* node = body.find("dem");
+    if (node->is_string()) {
+        named.request.path = (reading.folder / body.text("dem").value_or("")).string();
+    } else if (auto table = body.table("dem")) {
+        named.request = read_request(*table, reading);
+    }
+    reading.dems.push_back(std::move(named));
+}
+
+void load_dems(SceneReading& reading) {
+    for (const NamedDem& named : reading.dems) load_dem(named, reading);
+}
+
+}  // namespace narpa

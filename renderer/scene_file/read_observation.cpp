@@ -1,0 +1,124 @@
+// [observer], `orbit` of a body and `track` of a camera: what is seen from the ground (docs/atmosphere.md).
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/constants.h"
+#include "renderer/ephemeris/observer.h"
+#include "renderer/scene_file/scene_parts.h"
+
+namespace narpa {
+namespace {
+
+constexpr Range kAngle_deg{.low = -360, .high = 360};
+
+ObserverPlace read_place(TableReader& table) {
+    ObserverPlace place;
+    table.require("latitude_deg", "the geodetic latitude, north positive");
+    table.require("longitude_deg", "the longitude, east positive");
+    place.latitude_rad = kRadPerDeg * table.number("latitude_deg", {.low = -90, .high = 90}).value_or(0);
+    place.longitude_rad = kRadPerDeg * table.number("longitude_deg", kAngle_deg).value_or(0);
+    place.height_m = table.number("height_m", {.low = -1000, .high = 20'000}).value_or(0);
+    place.ut1_utc_s = table.number("ut1_utc_s", {.low = -0.9, .high = 0.9}).value_or(0);
+    place.temperature_k = 273.15 + table.number("temperature_c", {.low = -80, .high = 60}).value_or(10);
+    place.pressure_hpa = table.number("pressure_hpa", {.low = 0, .high = 1200}).value_or(1010);
+    return place;
+}
+
+/// Keeps an observer above the surface of the Earth's ellipsoid in spite of rounding errors of nanometres.
+void stand_on_earth(TableReader& table, ObserverPlace& place) {
+    constexpr double kAbove_m = 1e-3;
+    if (!table.has("earth")) return;
+    if (place.height_m < 0) table.fail("height_m", "is below the surface of `earth`, expected at least 0");
+    place.height_m = std::max(place.height_m, kAbove_m);
+}
+
+/// Gives the body of the Earth its attitude and rate.
+void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<Body>& bodies) {
+    const auto name = table.text("earth");
+    if (!name) return;
+    for (Body& b : bodies)
+        if (b.name == *name) {
+            b.initial.T_world_body.q = observer.q_world_earth();
+            b.initial.rate_rad_s = {0, 0, 7.292115e-5};
+            return;
+        }
+    table.fail("earth", fmt::format("there is no body \"{}\", expected the name of a [[body]]", *name));
+}
+
+}  // namespace
+
+void read_orbit(TableReader& body_table, Body& body) {
+    auto table = body_table.table("orbit");
+    if (!table) return;
+    for (const std::string_view key : {"position_m", "velocity_m_s"})
+        body_table.refuse(key, "the body has an orbit, which gives it; expected one of the two");
+    OrbitalElements o;
+    table->require("semi_major_axis_m", "a length from the Earth's centre");
+    o.semi_major_axis_m =
+        table->number("semi_major_axis_m", {.low = 6.4e6, .high = 1e9}).value_or(o.semi_major_axis_m);
+    o.eccentricity = table->number("eccentricity", {.low = 0, .high = 1, .high_open = true}).value_or(0);
+    const auto angle = [&](std::string_view key) {
+        return kRadPerDeg * table->number(key, kAngle_deg).value_or(0);
+    };
+    o.inclination_rad = angle("inclination_deg");
+    o.ascending_node_rad = angle("ascending_node_deg");
+    o.argument_of_perigee_rad = angle("argument_of_perigee_deg");
+    o.mean_anomaly_rad = angle("mean_anomaly_deg");
+    table->finish();
+    body.course = orbit_course(o, body.initial);
+    body.initial = body.course->at(0);
+}
+
+void read_observer(TableReader& root, SceneReading& reading) {
+    auto table = root.table("observer");
+    if (!table) return;
+    Scene& scene = reading.scene;
+    ObserverPlace place = read_place(*table);
+    stand_on_earth(*table, place);
+    const bool refracted = table->boolean("refraction").value_or(true);
+    if (scene.epoch_unix_ns == 0) root.fail("observer", "the time is not known, expected an \"epoch\" in [scene]");
+    const Observing observing{GroundObserver(place, scene.epoch_unix_ns), refracted};
+    turn_earth(*table, observing.at_start, scene.bodies);
+    const auto apparent = table->texts("sees");
+    for (const std::string& name : apparent.value_or(std::vector<std::string>{})) {
+        bool known = false;
+        for (Body& b : scene.bodies) {
+            if (b.name != name) continue;
+            known = true;
+            b.course = apparent_course(observing, b);
+            b.initial = b.course->at(0);
+        }
+        if (!known) table->fail("sees", fmt::format("there is no body \"{}\", expected names of [[body]]", name));
+    }
+    if (scene.sun && table->boolean("sun").value_or(true))
+        scene.sun->direction = observing.at_start.apparent_sun(refracted);
+    table->finish();
+    reading.observer = observing;
+}
+
+void read_tracking(TableReader& table, const SceneReading& reading, Camera& camera) {
+    const auto track = table.text("track");
+    const auto pointing = table.pair("azimuth_elevation_deg", kAngle_deg);
+    if (!track && !pointing) return;
+    const char* const key = track ? "track" : "azimuth_elevation_deg";
+    if (track && pointing) return table.fail(key, "there is an azimuth_elevation_deg too, expected one of the two");
+    for (const std::string_view other : {"mount", "position_m", "attitude_wxyz", "look_at"})
+        table.refuse(other, "the camera stands at the [observer] and points by itself; expected one of the two");
+    if (!reading.observer) return table.fail(key, "is seen by an observer, expected an [observer]");
+    const Observing& from = *reading.observer;
+    if (pointing) {
+        camera.course = camera_towards(from, (*pointing)[0] * kRadPerDeg, (*pointing)[1] * kRadPerDeg);
+    } else if (*track == "sun" && reading.scene.sun) {
+        camera.course = camera_towards_sun(from);
+    } else {
+        const auto body = std::find_if(reading.scene.bodies.begin(), reading.scene.bodies.end(),
+                                       [&](const Body& b) { return b.name == *track; });
+        if (body == reading.scene.bodies.end())
+            return table.fail(key, fmt::format("there is no body \"{}\", expected one, or \"sun\"", *track));
+        camera.course = camera_towards(from, *body);
+    }
+    camera.T_mount_camera = camera.course->at(0).T_world_body;
+}
+
+}  // namespace narpa

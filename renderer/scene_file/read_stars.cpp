@@ -1,0 +1,53 @@
+#include <fmt/format.h>
+
+#include "renderer/assets/star_catalogue.h"
+#include "renderer/scene_file/scene_parts.h"
+
+namespace narpa {
+namespace {
+
+constexpr double kJ2000 = 2000;
+constexpr Range kYears{.low = 1000, .high = 3000};  // straight proper motion is good to an arcminute here
+constexpr double kFastest_m_s = 2.9e8;              // below the speed of light
+
+/// An error at a line of the catalogue keeps its location; others get that of the scene file.
+Error blamed(Error error, const toml::source_region& place, const std::string& scene_file) {
+    if (error.line == 0)
+        return {.what = "catalogue: " + error.text(),
+                .file = scene_file,
+                .line = static_cast<int>(place.begin.line),
+                .column = static_cast<int>(place.begin.column)};
+    error.what += fmt::format(" (catalogue of [stars], {}:{})", scene_file, place.begin.line);
+    return error;
+}
+
+}  // namespace
+
+void read_stars(TableReader& root, SceneReading& reading, std::optional<double> epoch_year) {
+    auto table = root.table("stars");
+    if (!table) return;
+    table->require("catalogue", "the path of a star catalogue (CSV)");
+    const double catalogue_epoch = table->number("catalogue_epoch", kYears).value_or(kJ2000);
+    const double epoch = table->number("epoch", kYears).value_or(epoch_year.value_or(kJ2000));
+    const double faintest = table->number("faintest").value_or(kAnyNumber.high);
+    StarField field;
+    field.q_icrs_world = table->attitude("attitude_wxyz").value_or(Quat{});
+    field.rate_rad_s = table->vec3("rate_rad_s", {.low = -1e3, .high = 1e3}).value_or(Vec3{});
+    field.velocity_m_s = table->vec3("velocity_m_s").value_or(Vec3{});
+    if (!(norm(field.velocity_m_s) < kFastest_m_s))
+        table->fail("velocity_m_s", "expected a speed below that of light, 2.9e8 m/s at the most");
+    if (const auto name = table->text("catalogue")) {
+        const auto catalogue = read_star_catalogue((reading.folder / *name).string());
+        if (!catalogue) {
+            const toml::source_region& place = table->place("catalogue");
+            return reading.problems.add(place, blamed(catalogue.error(), place, reading.problems.file()));
+        }
+        for (const CatalogueStar& star : *catalogue)
+            if (star.v_magnitude <= faintest)
+                field.stars.push_back({star_direction(star, epoch - catalogue_epoch), star.v_magnitude, star.b_v});
+    }
+    table->finish();
+    reading.scene.stars = std::move(field);
+}
+
+}  // namespace narpa

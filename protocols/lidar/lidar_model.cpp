@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "protocols/lidar/livox.h"
 #include "protocols/lidar/ouster.h"
 #include "protocols/lidar/velodyne.h"
 
@@ -12,7 +13,7 @@ namespace {
 
 std::vector<const LidarMake*>& makes() {
     static std::vector<const LidarMake*> all = [] {
-        std::vector<const LidarMake*> built_in{&vlp16(), &hdl32e()};
+        std::vector<const LidarMake*> built_in{&vlp16(), &hdl32e(), &mid360()};
         std::ranges::copy(ouster_makes(), std::back_inserter(built_in));
         return built_in;
     }();

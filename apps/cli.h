@@ -1,5 +1,5 @@
-/// apps/cli.h - the subcommands of `narpa`, one file each. Text goes to standard error, the JSON document of --json
-/// to standard output; exit status: base/result.h.
+/// apps/cli.h - the subcommands of `narpa`, one file each, and what they share with those of `narpa bench`. Text
+/// goes to standard error, the JSON document of --json to standard output; exit status: base/result.h.
 #pragma once
 
 #include <functional>
@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "apps/options.h"
 #include "apps/progress.h"
@@ -32,14 +33,17 @@ Command add_replay(Parser app);
 Command add_compare(Parser app);
 Command add_estimate(Parser app);
 Command add_rehearse(Parser app);
-/// Subcommands of `narpa bench`.
-Command add_bench_render(Parser bench);
-Command add_bench_loop(Parser bench);
-Command add_bench_lidar(Parser bench);
-Command add_bench_latency(Parser bench);
-Command add_bench_atmosphere(Parser bench);
-Command add_bench_estimate(Parser bench);
-Command add_bench_terrain(Parser bench);
+
+struct CommandTexts {
+    std::string name, description;
+    std::vector<std::string> examples;  ///< command lines for --help
+};
+/// main() of a program of subcommands: parses the command line, runs the chosen one, prints what it returns.
+/// Returns the exit status.
+int run_commands(int argc, char** argv, const CommandTexts& texts,
+                 const std::vector<std::function<Command(Parser)>>& adders);
+/// Prints the result of a subcommand and returns the exit status.
+int finish(const Outcome& outcome, bool json);
 
 /// {"error": ...}, with the exit status.
 nlohmann::json to_json(const Error& e);

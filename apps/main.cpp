@@ -1,149 +1,55 @@
-// narpa - hardware-in-the-loop camera and LiDAR emulator. This file: subcommands, --json, exit status.
-#include <fmt/format.h>
+// narpa - hardware-in-the-loop camera and LiDAR emulator. This file: its subcommands; `narpa bench` starts
+// narpa-bench.
+#include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
-#include <exception>
-#include <filesystem>
+#include <string_view>
+#include <vector>
 
 #include "apps/cli.h"
-#include "apps/print_error.h"
-#include "apps/shipped.h"
-#include "base/each_isa.h"
-#include "base/lanes.h"
-#include "generated/commit.h"
-#include "renderer/scene_file/scene_file.h"
+#include "base/program_beside.h"
 
 namespace narpa::cli {
-
-Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method) {
-    const auto file = find_file(FileKind::scene, path);
-    if (!file) return file.error();
-    auto scene = [&] {
-        const Progress progress("reading " + *file);
-        return read_scene(*file);
-    }();
-    if (!scene) return scene;
-    if (method)
-        if (const Status good = use_method(*scene, *method); !good) return good.error();
-    for (const std::string& w : scene->warnings) say("warning: " + w);
-    return scene;
-}
-
-Status make_folder_of(const std::string& file) {
-    const auto folder = std::filesystem::path(file).parent_path();
-    std::error_code failed;
-    if (!folder.empty()) std::filesystem::create_directories(folder, failed);
-    if (failed)
-        return Error{"its folder cannot be made: " + failed.message(), file, 0, 0,
-                     failed == std::errc::permission_denied || failed == std::errc::read_only_file_system
-                         ? ErrorKind::missing
-                         : ErrorKind::bad_input};
-    return Ok{};
-}
-
-Status make_folder_of_picture(const std::string& file) {
-    const auto extension = std::filesystem::path(file).extension();
-    if (!file.empty() && extension != ".png" && extension != ".svg" && extension != ".pdf")
-        return Error{"expected the name of a picture, FILE.png, .svg or .pdf", file};
-    return make_folder_of(file);
-}
-
-Result<std::pair<std::string, std::string>> split_pair(const std::string& text, std::string_view expected) {
-    const std::size_t at = text.find('=');
-    if (at == std::string::npos || at == 0 || at + 1 == text.size())
-        return Error{fmt::format("\"{}\", expected {}", text, expected)};
-    return std::pair{text.substr(0, at), text.substr(at + 1)};
-}
-
-nlohmann::json to_json(const Error& e) {
-    return {{"error",
-             {{"what", e.what},
-              {"file", e.file},
-              {"line", e.line},
-              {"column", e.column},
-              {"remedy", e.remedy},
-              {"exit_status", exit_status(e.kind)}}}};
-}
-
 namespace {
 
-/// False: standard output cannot be written.
-bool print_json(const nlohmann::json& document) {
-    fmt::print("{}\n", document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
-    if (std::fflush(stdout) == 0) return true;
-    say(fmt::format("narpa: standard output cannot be written: {}", std::strerror(errno)));
-    return false;
-}
-
-int finish(const Outcome& outcome, bool json) {
-    if (!outcome) {
-        say("narpa: " + outcome.error().text());
-        if (json) print_json(to_json(outcome.error()));
-        return exit_status(outcome.error().kind);
-    }
-    if (json && !print_json(*outcome)) return exit_status(ErrorKind::failed);
-    if (outcome->contains("error")) return (*outcome)["error"]["exit_status"];
-    return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
-}
-
+/// For --help: start_bench has taken its command lines.
 Command add_bench(Parser app) {
-    const Parser bench = app.subcommand("bench", "Measure speed against error");
-    bench.group("Measure");
-    auto chosen = std::make_shared<Command>();
-    bench.choice<Command>({add_bench_render, add_bench_loop, add_bench_latency, add_bench_lidar,
-                           add_bench_atmosphere, add_bench_estimate, add_bench_terrain},
-                          *chosen);
-    bench.examples({"narpa bench loop docking", "narpa bench render --spp 4,16,64 -o out/error.png"});
-    return [chosen] { return (*chosen)(); };
+    app.subcommand("bench", "Measure speed against error").group("Measure");
+    return {};
 }
 
-constexpr const char* kDescription =
-    "narpa emulates a spacecraft's camera and LiDAR: poses in on CAN, camera frames out on V4L2, LiDAR packets "
-    "out on UDP.";
-
-/// The widest of the instruction sets of base/each_isa.h that this processor has.
-const char* isa_in_use() {
-#ifdef NARPA_HAS_EACH_ISA
-    __builtin_cpu_init();
-    if (__builtin_cpu_supports("x86-64-v4")) return "AVX-512 (x86-64-v4)";
-    if (__builtin_cpu_supports("x86-64-v3")) return "AVX2 (x86-64-v3)";
-#endif
-    return "the compiler's base line";
-}
-
-/// "narpa 0.1.0, commit 2bbdc3b" and the instruction set, which decides the last bits of results.
-std::string version() {
-    const std::string commit = NARPA_COMMIT;
-    return fmt::format("narpa {}{}\nvector instructions: {}, {} rays at once", NARPA_VERSION,
-                       commit.empty() ? "" : ", commit " + commit, isa_in_use(), kLanes);
-}
-
-int run(int argc, char** argv) {
-    bool json = false;
-    Command chosen;
-    const auto add_subcommands = [&](const Parser& app) {
-        app.choice<Command>({add_list, add_check, add_rehearse, add_run, add_fly, add_render, add_map, add_scan,
-                             add_estimate, add_compare, add_replay, add_bench},
-                            chosen);
-        app.examples({"narpa rehearse docking                        a docking in a closed loop, with a report",
-                      "narpa render docking -o out/view.png          what the camera sees",
-                      "narpa run docking --can vcan0 --video nav=/dev/video10 --log out/run"});
-    };
-    return parse_and_run(
-        argc, argv, {"narpa", kDescription, version()}, add_subcommands, [&] { return finish(chosen(), json); },
-        &json);
+/// Replaces this program by narpa-bench; returns the exit status only where that fails. `bench`: that word in argv.
+int start_bench(char** argv, char** bench) {
+    const bool json = std::any_of(argv, bench, [](std::string_view word) { return word == "--json"; });
+    const std::string program = program_beside("narpa-bench");
+    std::copy_backward(argv + 1, bench, bench + 1);
+    argv[1] = argv[0];
+    ::execvp(program.c_str(), argv + 1);
+    if (errno == ENOENT)
+        return finish(Error{"is not built or not installed", program, 0, 0, ErrorKind::missing,
+                            "cmake --build --preset release --target narpa-bench"},
+                      json);
+    return finish(Error{std::strerror(errno), program, 0, 0, ErrorKind::missing}, json);
 }
 
 }  // namespace
 }  // namespace narpa::cli
 
 int main(int argc, char** argv) {
-    try {
-        return narpa::cli::run(argc, argv);
-    } catch (const std::exception& e) {  // such as out of memory: narpa's own code does not throw
-        narpa::cli::print_error("narpa: {}\n", e.what());
-        return 1;
-    }
+    using namespace narpa::cli;
+    char** const first =
+        std::find_if(argv + 1, argv + argc, [](std::string_view word) { return word != "--json"; });
+    if (first < argv + argc && *first == std::string_view("bench")) return start_bench(argv, first);
+    return run_commands(
+        argc, argv,
+        {"narpa",
+         "narpa emulates a spacecraft's camera and LiDAR: poses in on CAN, camera frames out on V4L2, "
+         "LiDAR packets out on UDP.",
+         {"narpa rehearse docking                        a docking in a closed loop, with a report",
+          "narpa render docking -o out/view.png          what the camera sees",
+          "narpa run docking --can vcan0 --video nav=/dev/video10 --log out/run"}},
+        {add_list, add_check, add_rehearse, add_run, add_fly, add_render, add_map, add_scan, add_estimate,
+         add_compare, add_replay, add_bench});
 }

@@ -54,6 +54,14 @@ TEST(BenchRender, TheCornellBoxConvergesToItsReferenceWithoutBias) {
     EXPECT_LT(document["reference"]["mean"], 1.0);
 }
 
+TEST(BenchProgram, WhereItIsNotBuiltSaysHowToBuildIt) {
+    const test::TemporaryFolder folder;
+    std::filesystem::copy_file(NARPA_BIN, folder / "narpa");
+    const Done done = test::run_command("PATH= " + (folder / "narpa") + " bench render 2>&1 >/dev/null");
+    EXPECT_EQ(done.status, 3);
+    EXPECT_NE(done.out.find("--target narpa-bench"), std::string::npos) << done.out;
+}
+
 TEST(BenchRender, AFailedComparisonEndsWithStatusOne) {
     // The even light of [ambient] on a surface that fills the view: no sample differs from another.
     const test::TemporaryFolder folder;

@@ -1,4 +1,4 @@
-#include "apps/bench_scene.h"
+#include "bench/commands/scene.h"
 
 #include <algorithm>
 #include <filesystem>

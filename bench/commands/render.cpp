@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <numeric>
 
-#include "apps/bench_ladder.h"
-#include "apps/bench_scene.h"
-#include "apps/cli.h"
 #include "bench/budget_ladder.h"
+#include "bench/commands/commands.h"
+#include "bench/commands/ladder.h"
+#include "bench/commands/scene.h"
 #include "plot/plot.h"
 
 namespace narpa::cli {

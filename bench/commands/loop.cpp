@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <chrono>
 
-#include "apps/bench_scene.h"
-#include "apps/cli.h"
 #include "apps/scene_options.h"
+#include "bench/commands/commands.h"
+#include "bench/commands/scene.h"
 #include "bench/loop.h"
 #include "emulator/realtime.h"
 

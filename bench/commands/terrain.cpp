@@ -1,7 +1,7 @@
 // narpa bench terrain - time of a ray into terrain, compared with one into a mesh of only the visible triangles.
 #include <fmt/format.h>
 
-#include "apps/cli.h"
+#include "bench/commands/commands.h"
 #include "bench/terrain_cost.h"
 
 namespace narpa::cli {

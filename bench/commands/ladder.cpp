@@ -1,6 +1,6 @@
 // narpa bench render --scenes - time and error on the benchmark scenes; --ablation - the effect of each rendering
 // technique, switched off in turn.
-#include "apps/bench_ladder.h"
+#include "bench/commands/ladder.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <array>
 #include <utility>
 
-#include "apps/bench_scene.h"
+#include "bench/commands/scene.h"
 #include "bench/gates.h"
 #include "emulator/trajectory.h"
 #include "plot/plot.h"

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/bench_scene.h"
-#include "apps/cli.h"
 #include "apps/scene_options.h"
+#include "bench/commands/commands.h"
+#include "bench/commands/scene.h"
 #include "bench/lidar_cost.h"
 #include "protocols/lidar/lidar_model.h"
 

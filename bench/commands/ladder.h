@@ -1,6 +1,6 @@
-/// apps/bench_ladder.h - `narpa bench render --scenes`: time and error on the benchmark scenes at several sample
-/// budgets, and the ratios that the gates check; --ablation: the same with each rendering technique switched off in
-/// turn.
+/// bench/commands/ladder.h - `narpa bench render --scenes`: time and error on the benchmark scenes at several
+/// sample budgets, and the ratios that the gates check; --ablation: the same with each rendering technique switched
+/// off in turn.
 #pragma once
 
 #include <string>

@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "apps/cli.h"
 #include "bench/air_error.h"
+#include "bench/commands/commands.h"
 
 namespace narpa::cli {
 namespace {

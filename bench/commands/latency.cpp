@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "apps/cli.h"
+#include "bench/commands/commands.h"
 #include "bench/latency.h"
 #include "rehearsal/runner/free_port.h"
 

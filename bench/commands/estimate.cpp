@@ -5,11 +5,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/bench_scene.h"
-#include "apps/cli.h"
 #include "apps/scene_options.h"
 #include "bench/approach.h"
 #include "bench/cold.h"
+#include "bench/commands/commands.h"
+#include "bench/commands/scene.h"
 #include "bench/consistency.h"
 #include "bench/consistency_scenes.h"
 #include "bench/filter.h"

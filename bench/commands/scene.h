@@ -1,4 +1,4 @@
-/// apps/bench_scene.h - scenes shipped with narpa, at other image sizes.
+/// bench/commands/scene.h - scenes shipped with narpa, at other image sizes.
 #pragma once
 
 #include <optional>

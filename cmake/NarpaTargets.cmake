@@ -75,11 +75,12 @@ function(narpa_link target)
   endforeach()
 endfunction()
 
-# narpa_library(FOLDER [SIMD] [INTERNAL] LINKS LIBRARIES...) - one library of all sources below FOLDER except main.cpp.
+# narpa_library(FOLDER [SIMD|LIGHT] [INTERNAL] LINKS LIBRARIES...) - one library of all sources below FOLDER except main.cpp.
 # LINKS names the libraries whose headers it may include; tests/layout checks every #include against these lists. SIMD:
-# loops over the lanes of a ray batch are to be vectorised. INTERNAL: it is not installed.
+# loops over the lanes of a ray batch are to be vectorised. LIGHT: it computes little, and compiles in three quarters of
+# the time with less optimization. INTERNAL: it is not installed.
 function(narpa_library folder)
-  cmake_parse_arguments(arg "SIMD;INTERNAL" "" "LINKS" ${ARGN})
+  cmake_parse_arguments(arg "SIMD;LIGHT;INTERNAL" "" "LINKS" ${ARGN})
   string(REPLACE "/" "_" name ${folder})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
@@ -109,6 +110,9 @@ function(narpa_library folder)
   narpa_compile_options(narpa_${name})
   if(NARPA_SANITIZE AND folder MATCHES "^(base|protocols|renderer|estimator)")
     target_compile_options(narpa_${name} PRIVATE -O1)  # folders that compute; others compile in half the time without
+  endif()
+  if(arg_LIGHT)
+    target_compile_options(narpa_${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
   endif()
   if(arg_SIMD)
     # GCC otherwise leaves most of these loops scalar. Neither option changes a result: no floating-point exception flag

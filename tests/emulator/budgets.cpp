@@ -124,7 +124,7 @@ std::vector<FrameLedger> fly(CanBus& hub, const std::vector<PoseCommand>& comman
     }
     LedgerDecoder decoder;
     std::vector<FrameLedger> ledgers;
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(1800);
     while (ledgers.size() < frames && std::chrono::steady_clock::now() < until) {
         bus->wait(10'000'000);
         FrameLedger ledger;

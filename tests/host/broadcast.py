@@ -95,7 +95,7 @@ def inside():
             expect(packets == expected, f"{host}: receiver {i + 1} has the bytes of the capture ({len(packets)} packets)")
             expect(name != "group" or ttls == {TTL}, f"{host}: they came with the time to live {sorted(ttls)}")
     if pcl:
-        live, _ = pcl.communicate(timeout=60)
+        live, _ = pcl.communicate(timeout=600)
         recorded = subprocess.run([RECEIVER, "VLP-16", "pcap", capture, "1", "30"], stdout=subprocess.PIPE, text=True)
         expect(pcl.returncode == 0 and recorded.returncode == 0, "PCL got a sweep, and one from the capture")
         points = points_of(live)

@@ -256,7 +256,7 @@ def check_modes():
             expect_refusal(2, words, "fly", flight, "--can", bus, *other)
             if mode:
                 narpa("fly", flight, "--can", bus, *mode)
-                summary = json.loads(run.process.communicate(timeout=60)[0])
+                summary = json.loads(run.process.communicate(timeout=600)[0])
                 taken, drops = summary["can"]["commands_taken"], summary["can"]["send_drops"]
                 expect(taken == 5 and drops <= 2, f"fly --lockstep then commands it; at most the first and the last heartbeat had no client: {taken}, {drops}")
     with silent_hub() as bus:
@@ -283,7 +283,7 @@ def check_gone():
             fly = subprocess.Popen([support.NARPA, "fly", str(file), "--can", bus, *mode], stderr=subprocess.PIPE, text=True)
             time.sleep(1.5)
             run.process.kill() if kill else run.stop()
-            said = fly.communicate(timeout=60)[1]
+            said = fly.communicate(timeout=600)[1]
         expect(fly.returncode == status and re.search(words, said), f"fly {mode}, emulator {'killed' if kill else 'stopped'}: status {fly.returncode}, {said[-300:]}")
 
 

@@ -35,7 +35,7 @@ def started(name, *command):
 
 def finished(name, process, out):
     try:
-        status = process.wait(timeout=60)
+        status = process.wait(timeout=600)
     except subprocess.TimeoutExpired:
         process.kill()
         status = "(does not end)"
@@ -52,7 +52,7 @@ def check_dynamics_and_navigation(seconds):
         channel = "slcan:" + run.wait_for(r"commands: slcan: 127\.0\.0\.1:(\d+) ")[1]
         navigation = started("navigation", sys.executable, EXAMPLES / "navigation.py", channel, fifo, "0")
         done = subprocess.run([sys.executable, EXAMPLES / "dynamics.py", channel, str(seconds)], capture_output=True,
-                              text=True, timeout=120)
+                              text=True, timeout=1200)
         expect(done.returncode == 0, f"dynamics.py ends well: {done.returncode} {done.stderr[-500:]}")
         expect(len(done.stdout.splitlines()) == seconds, f"it was commanded {seconds} times: {done.stdout[-300:]}")
         output = finished("navigation.py", *navigation)
@@ -70,7 +70,7 @@ scene = "{SCENES}/scene.toml"\nduration_s = {seconds}.0\n""")
     bus = ["--can", f"udp:{GROUP}", "--lockstep"]
     navigation = started("narpa-navigation", BUILD / "bin/narpa-navigation", scenario, *bus, "--video", f"nav={fifo}")
     done = subprocess.run([BUILD / "bin/narpa-dynamics", scenario, *bus, "--patience", "60"], capture_output=True,
-                          text=True, timeout=120)
+                          text=True, timeout=1200)
     expect(done.returncode == 0, f"narpa-dynamics ends well: {done.returncode} {done.stderr[-500:]}")
     finished("narpa-navigation", *navigation)
     output = finished("emulator.py", *emulator)

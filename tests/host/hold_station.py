@@ -85,12 +85,12 @@ def fly(folder):
             await_line(run, folder / "navigation.out", "ready")
             dynamics = start(folder, "dynamics.out", [BUILD / "bin/narpa-dynamics", scenario, "--can", f"slcan:{port}",
                                                       "--patience", "60", *mode])
-            ended = dynamics.wait(timeout=150)
+            ended = dynamics.wait(timeout=1500)
             output = (folder / "navigation.out").read_text()
             if ended != 0:
                 print((folder / "dynamics.out").read_text(), output)
             expect(ended == 0, "narpa-dynamics flies to the end")
-            expect(navigation.wait(timeout=30) == 0, "examples/navigation.py ends with it")
+            expect(navigation.wait(timeout=300) == 0, "examples/navigation.py ends with it")
         finally:
             navigation.kill()
         summary = run.stop()

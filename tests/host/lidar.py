@@ -160,21 +160,21 @@ for name, make in LIDARS.items():
 can_port, ports, receivers, sinks = support.free_port(), {}, {}, []
 for name, make in LIDARS.items():
     ports[name] = support.free_lidar_port()
-    command = [RECEIVER, make, "udp", "127.0.0.1", str(ports[name]), str(SWEEP + 1), "60"]
+    command = [RECEIVER, make, "udp", "127.0.0.1", str(ports[name]), str(SWEEP + 1), "600"]
     receivers[name] = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     expect(receivers[name].stdout.readline() == "ready\n", f"PCL listens for the {make}")
     for sink in (f"udp:127.0.0.1:{ports[name]}", folder / f"{name}.pcap"):
         sinks += ["--lidar", f"{name}={sink}"]
 with support.Run(scene, "--can", f"slcan:{can_port}", *sinks, "--lockstep") as run:
     fly(run, can_port, trajectory)
-    live = {name: receiver.communicate(timeout=90)[0] for name, receiver in receivers.items()}
+    live = {name: receiver.communicate(timeout=900)[0] for name, receiver in receivers.items()}
     summary = run.stop()
 print("summary:", summary["lidars"])
 for name, make in LIDARS.items():
     expect(receivers[name].returncode == 0, f"PCL got the {make}'s sweeps live")
     compare(points_of(live[name]), sweeps[name], make, f"{make}, live over UDP")
 
-    command = [RECEIVER, make, "pcap", folder / f"{name}.pcap", str(SWEEP + 1), "60"]
+    command = [RECEIVER, make, "pcap", folder / f"{name}.pcap", str(SWEEP + 1), "600"]
     recorded = subprocess.run(command, stdout=subprocess.PIPE, text=True)
     expect(recorded.returncode == 0, f"PCL got the {make}'s sweeps from the capture")
     compare(points_of(recorded.stdout), sweeps[name], make, f"{make}, from the capture")

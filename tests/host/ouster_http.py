@@ -42,12 +42,12 @@ class Client:
         self.port, self.url = port, f"http://127.0.0.1:{port}/api/v1/"
 
     def get(self, path):
-        with urllib.request.urlopen(self.url + path, timeout=10) as answer:
+        with urllib.request.urlopen(self.url + path, timeout=120) as answer:
             return answer.read().decode()
 
     def post(self, path, body):
         request = urllib.request.Request(self.url + path, data=body, headers={"Content-Type": "application/json"})
-        with urllib.request.urlopen(request, timeout=10) as answer:
+        with urllib.request.urlopen(request, timeout=120) as answer:
             return answer.read().decode()
 
     def refused(self, method, *arguments):
@@ -59,7 +59,7 @@ class Client:
 
     def raw(self, data):
         """Sends data; returns all that is received until the server closes the connection."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=10) as s:
+        with socket.create_connection(("127.0.0.1", self.port), timeout=120) as s:
             s.sendall(data)
             answer = b""
             while piece := s.recv(4096):

@@ -89,7 +89,7 @@ def check(tool, start_reader, pixel_format):
     at_file = start_reader(file, pixel_format, folder / "from_file")
     wanted = rendered(scene, folder)
     for source, reader in ("fifo", at_fifo), ("file", at_file):
-        expect(reader.wait(timeout=60) == 0, f"{tool} ends well")
+        expect(reader.wait(timeout=600) == 0, f"{tool} ends well")
         got = (folder / f"from_{source}").read_bytes()
         support.expect_frames(split(got, size), wanted, f"{tool}, {pixel_format}, {source}")
 

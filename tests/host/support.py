@@ -90,7 +90,7 @@ def scene_with(folder, pixel_format):
 
 def narpa(*arguments, status=0):
     """Runs narpa and waits for it; fails unless its exit status is `status`. Returns its CompletedProcess."""
-    done = subprocess.run([NARPA, *map(str, arguments)], capture_output=True, timeout=300)
+    done = subprocess.run([NARPA, *map(str, arguments)], capture_output=True, timeout=1800)
     if done.returncode != status:
         print(done.stderr.decode(errors="replace"))
         expect(False, f"narpa {' '.join(map(str, arguments))} exits with {status}, not {done.returncode}")
@@ -126,7 +126,7 @@ class Run:
             print(self.stderr())
             expect(False, f"narpa run is still running (it ended with {self.process.returncode})")
 
-    def wait_for(self, pattern, seconds=60):
+    def wait_for(self, pattern, seconds=600):
         """Waits for the pattern in narpa's standard error; returns the first match."""
         for _ in range(int(seconds * 20)):
             if match := re.search(pattern, self.stderr()):
@@ -136,7 +136,7 @@ class Run:
         print(self.stderr())
         expect(False, f"narpa run says {pattern} within {seconds} s")
 
-    def finish(self, seconds=60):
+    def finish(self, seconds=600):
         """Waits until narpa ends by itself."""
         out, _ = self.process.communicate(timeout=seconds)
         if self.process.returncode != 0:

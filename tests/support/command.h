@@ -15,8 +15,8 @@ struct Done {
 };
 
 /// Prefix of a program that could hang: exit status 124 after this time. No build needs as long, even a sanitizer's
-/// on a busy machine.
-inline constexpr const char* kTimeLimit = "timeout 120 ";
+/// on a slow, busy machine.
+inline constexpr const char* kTimeLimit = "timeout 1800 ";
 
 /// A command of the shell, which can send standard error elsewhere.
 inline Done run_command(const std::string& command) {

@@ -10,7 +10,7 @@
 #include "apps/outputs.h"
 #include "apps/scene_options.h"
 #include "base/write_file.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/frame_tracker.h"
 #include "emulator/threads.h"
 #include "emulator/world.h"

@@ -11,7 +11,7 @@
 #include "apps/exposure_advice.h"
 #include "apps/outputs.h"
 #include "apps/scene_options.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/clock.h"
 #include "emulator/report.h"
 #include "emulator/threads.h"

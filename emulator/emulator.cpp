@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <set>
 
-#include "emulator/camera_sensor.h"
-#include "emulator/lidar_sensor.h"
+#include "emulator/camera/camera_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
 #include "emulator/log/run_record.h"
 #include "emulator/threads.h"
 

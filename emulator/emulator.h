@@ -11,7 +11,7 @@
 
 #include "base/result.h"
 #include "base/stop.h"
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 #include "emulator/online_estimator.h"
 #include "emulator/realtime.h"
 #include "emulator/sensor.h"

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "base/time.h"
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/search/pose_search.h"

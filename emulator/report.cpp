@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/constants.h"
-#include "emulator/camera_sensor.h"
-#include "emulator/lidar_sensor.h"
+#include "emulator/camera/camera_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
 #include "emulator/log/estimate_report.h"
 
 namespace narpa {

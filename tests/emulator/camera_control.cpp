@@ -1,6 +1,6 @@
 // A camera that is operated over CAN while it runs: settings act in the promised frame, triggers expose at their
 // time, and every frame states what it was taken with.
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 
 #include <numeric>
 #include <random>

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/log/estimate_report.h"
 #include "emulator/trajectory.h"
 #include "renderer/camera/scene_camera.h"

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "drivers/can/can_bus.h"
-#include "emulator/camera_sensor.h"
+#include "emulator/camera/camera_sensor.h"
 #include "emulator/emulator.h"
-#include "emulator/lidar_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
 #include "protocols/can/messages.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/support/read_file.h"

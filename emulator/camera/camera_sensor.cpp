@@ -1,4 +1,4 @@
-#include "emulator/camera_sensor.h"
+#include "emulator/camera/camera_sensor.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/trajectory.h"
 #include "renderer/camera/read_out.h"

@@ -1,4 +1,5 @@
-/// emulator/camera_sensor.h - a camera in the loop: frames from its unit to sinks, logs, ledgers and estimator.
+/// emulator/camera/camera_sensor.h - a camera in the loop: frames from its unit to sinks, logs, ledgers and
+/// estimator.
 #pragma once
 
 #include <array>
@@ -10,8 +11,8 @@
 
 #include "base/spsc_ring.h"
 #include "drivers/video/video_sink.h"
-#include "emulator/camera_control.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_control.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/log/contact_sheet.h"
 #include "emulator/log/histogram.h"
 #include "emulator/log/row_log.h"

@@ -1,4 +1,4 @@
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 
 #include <algorithm>
 #include <cmath>

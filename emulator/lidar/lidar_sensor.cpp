@@ -1,9 +1,9 @@
-#include "emulator/lidar_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 
 namespace narpa {
 

@@ -1,4 +1,5 @@
-/// emulator/lidar_sensor.h - a LiDAR in the loop: packets from its unit to sinks at the instrument's own rate.
+/// emulator/lidar/lidar_sensor.h - a LiDAR in the loop: packets from its unit to sinks at the instrument's own
+/// rate.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +8,7 @@
 
 #include "base/spsc_ring.h"
 #include "drivers/lidar/packet_sink.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "emulator/log/histogram.h"
 #include "emulator/log/sweep_log.h"
 #include "emulator/sensor.h"

@@ -1,4 +1,4 @@
-/// emulator/can_node.h - narpa on the CAN bus: commands in, heartbeat, frame ledgers and estimates out. One thread
+/// emulator/bus/can_node.h - narpa on the CAN bus: commands in, heartbeat, ledgers and estimates out. One thread
 /// uses it.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 #include "drivers/can/can_bus.h"
 #include "drivers/can/client_hub.h"
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 #include "emulator/log/row_log.h"
 #include "emulator/world.h"
 #include "protocols/can/messages.h"

@@ -11,7 +11,8 @@
 #include "emulator/lidar/lidar_unit.h"
 #include "emulator/log/histogram.h"
 #include "emulator/log/sweep_log.h"
-#include "emulator/sensor.h"
+#include "emulator/sensor_kind.h"
+#include "emulator/sinks.h"
 #include "protocols/lidar_beam.h"
 
 namespace narpa {
@@ -49,6 +50,7 @@ public:
     void make_next(const Clock& clock) override;
     void send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept override;
     [[nodiscard]] std::uint64_t drops() const noexcept override;
+    [[nodiscard]] std::uint64_t made() const noexcept override { return stats_.packets; }
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
     [[nodiscard]] std::string to_text(bool lockstep) const override;
@@ -76,5 +78,8 @@ private:
     SpscRing<LidarBeamReport, 1024> beams_;
     std::uint64_t beams_lost_ = 0;  ///< the CAN thread did not keep up
 };
+
+/// SensorKind::open.
+Status open_lidars(const World& world, const RunOptions& options, OpenSensors& out);
 
 }  // namespace narpa

@@ -59,8 +59,7 @@ protected:
         for (const std::string& camera : cameras) o.video.emplace_back(camera, folder_ / (camera + ".y4m").c_str());
         const auto emulator = ran(scene(scene_text), o);
         if (!emulator) return {};
-        for (const CameraSensor* camera : emulator->sensors_of<CameraSensor>())
-            counters_.push_back(camera->control()->counters());
+        for (const CameraSensor* camera : emulator->cameras()) counters_.push_back(camera->control()->counters());
         for (const auto& [cause, n] : emulator->can()->counters().rejected())
             if (n > 0) rejected_[cause] = n;
         return read_traffic();

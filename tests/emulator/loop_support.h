@@ -66,10 +66,10 @@ inline std::vector<std::map<std::string, std::string>> read_rows(const std::stri
 
 /// The first camera and the first LiDAR of a run.
 inline const CameraSensor& camera_of(const Emulator& emulator) {
-    return *emulator.sensors_of<CameraSensor>().front();
+    return *emulator.cameras().front();
 }
 inline const LidarSensor& lidar_of(const Emulator& emulator) {
-    return *emulator.sensors_of<LidarSensor>().front();
+    return *emulator.lidars().front();
 }
 
 class LoopTest : public ::testing::Test {

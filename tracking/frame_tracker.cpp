@@ -1,4 +1,4 @@
-#include "emulator/frame_tracker.h"
+#include "tracking/frame_tracker.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "emulator/log/estimate_report.h"
+#include "tracking/estimate_report.h"
 
 #include <fmt/format.h>
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <barrier>
+#include <cassert>
 #include <thread>
 
 #include "base/time.h"
@@ -199,6 +200,7 @@ void Emulator::advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFla
         Sensor& next = **std::ranges::min_element(sensors_.all, {}, last_pose);
         const std::int64_t t_pose = next.last_pose_ns();
         if (t_pose > t_ns || t_pose >= clock.end_ns()) break;
+        assert(next.due_ns() >= t_pose && "an item is made once its poses are known");
         clock.set(next.due_ns());
         execute(next, *threads_, [&] { next.make_next(clock); });
         send_telemetry(t_pose);

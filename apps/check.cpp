@@ -22,7 +22,7 @@
 #include "drivers/can/usb_adapters.h"
 #include "drivers/video/bulk_bridges.h"
 #include "drivers/video/video_sink.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/world.h"
 #include "protocols/can/dbc.h"
 #include "protocols/lidar/lidar_model.h"

@@ -10,13 +10,13 @@
 #include "apps/outputs.h"
 #include "apps/scene_options.h"
 #include "base/write_file.h"
-#include "emulator/camera_unit.h"
-#include "emulator/frame_tracker.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/threads.h"
 #include "emulator/world.h"
 #include "estimator/view/frame_comparison.h"
 #include "plot/plot.h"
 #include "renderer/image/image_file.h"
+#include "tracking/frame_tracker.h"
 
 namespace narpa::cli {
 namespace {

@@ -12,7 +12,6 @@
 #include "apps/shipped.h"
 #include "base/write_file.h"
 #include "drivers/lidar/packet_source.h"
-#include "emulator/log/estimate_report.h"
 #include "emulator/replay/replay.h"
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
@@ -21,6 +20,7 @@
 #include "estimator/view/measured_image.h"
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/image/image_file.h"
+#include "tracking/estimate_report.h"
 
 namespace narpa::cli {
 namespace {

@@ -11,9 +11,9 @@
 #include "apps/exposure_advice.h"
 #include "apps/outputs.h"
 #include "apps/scene_options.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/clock.h"
-#include "emulator/report.h"
+#include "emulator/log/statistics.h"
 #include "emulator/threads.h"
 #include "renderer/image/image_file.h"
 

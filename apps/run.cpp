@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/cli.h"
@@ -11,6 +12,7 @@
 #include "emulator/realtime.h"
 #include "emulator/report.h"
 #include "rehearsal/runner/run_folder.h"
+#include "tracking/online_estimator.h"
 
 namespace narpa::cli {
 namespace {
@@ -22,6 +24,7 @@ struct RunCommandOptions {
     std::optional<std::uint64_t> seed;
     BudgetOptions budget;
     bool estimates = false;
+    std::string estimate_camera;  ///< empty: the first
     TrackerFlags estimator;
     RunOptions run;
     int ready_fd = -1;
@@ -80,7 +83,7 @@ Outcome run(const RunCommandOptions& options) {
     if (options.estimates) {
         auto estimator = options.estimator.options();
         if (!estimator) return estimator.error();
-        o.estimate = *estimator;
+        o.observers.push_back(estimate_from(options.estimate_camera, *estimator));
     }
     o.on_refusal = [](const std::string& what) { say("note: " + what); };
     std::optional<Descriptor> lock;  // two runs into one folder would mix their logs
@@ -104,8 +107,7 @@ Outcome run(const RunCommandOptions& options) {
     for (const auto& sensor : (*emulator)->sensors())
         for (const std::string& output : sensor->outputs())
             say(fmt::format("{} {} -> {}", sensor->kind(), sensor->name(), output));
-    if (const OnlineEstimator* estimator = (*emulator)->estimator())
-        say(fmt::format("pose of {} from camera {}", estimator->target(), estimator->camera().name));
+    for (const auto& feed : (*emulator)->observers()) say(feed->observer().description());
 
     notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
     const Status status = [&] {
@@ -114,7 +116,9 @@ Outcome run(const RunCommandOptions& options) {
     }();
     say(to_text(**emulator));
     if (!status) return status.error();
-    return report(**emulator);
+    nlohmann::json document = report(**emulator);
+    if (!options.estimates) document["estimate"] = nullptr;
+    return document;
 }
 
 }  // namespace
@@ -155,7 +159,7 @@ Command add_run(Parser app) {
         .needs(log);
     const Option estimate =
         c.option(
-             "--estimate", o->run.estimate_camera,
+             "--estimate", o->estimate_camera,
              "Estimate the target's pose from this camera's frames (default: the first), on a thread of its own")
             .values(0, 1)
             .type_name("[CAMERA]");

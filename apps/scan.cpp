@@ -13,7 +13,7 @@
 #include "apps/scene_options.h"
 #include "base/write_file.h"
 #include "drivers/lidar/packet_sink.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "emulator/log/sweep_log.h"
 
 namespace narpa::cli {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "apps/cli.h"
-#include "emulator/frame_tracker.h"
 #include "emulator/world.h"
+#include "tracking/frame_tracker.h"
 
 namespace narpa::cli {
 

@@ -10,10 +10,10 @@
 
 #include "base/time.h"
 #include "bench/statistics.h"
-#include "emulator/log/estimate_report.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "renderer/camera/detector.h"
+#include "tracking/estimate_report.h"
 
 namespace narpa {
 namespace {

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "base/stop.h"
-#include "emulator/frame_tracker.h"
 #include "emulator/threads.h"
 #include "estimator/view/measured_image.h"
 #include "estimator/view/model_view.h"
+#include "tracking/frame_tracker.h"
 
 namespace narpa {
 

@@ -13,10 +13,10 @@
 
 #include "bench/consistency_scenes.h"
 #include "bench/statistics.h"
-#include "emulator/log/estimate_report.h"
 #include "estimator/search/pose_search.h"
 #include "estimator/search/template_matcher.h"
 #include "renderer/camera/detector.h"
+#include "tracking/estimate_report.h"
 
 namespace narpa {
 namespace {

@@ -7,7 +7,6 @@
 #include <random>
 
 #include "bench/consistency_scenes.h"
-#include "emulator/log/estimate_report.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
@@ -17,6 +16,7 @@
 #include "protocols/lidar/velodyne.h"
 #include "renderer/camera/detector.h"
 #include "renderer/projection/distortion.h"
+#include "tracking/estimate_report.h"
 
 namespace narpa {
 namespace {

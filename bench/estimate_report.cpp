@@ -15,7 +15,7 @@
 #include "bench/pnp.h"
 #include "bench/statistics.h"
 #include "bench/stereo.h"
-#include "emulator/log/estimate_report.h"
+#include "tracking/estimate_report.h"
 
 namespace narpa {
 namespace {

@@ -9,7 +9,7 @@
 #include "base/counter_random.h"
 #include "bench/raw_embree_scene.h"
 #include "bench/statistics.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "renderer/lidar/beam_cone.h"
 
 namespace narpa {

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "emulator/report.h"
+#include "emulator/log/statistics.h"
 #include "plot/plot.h"
 
 namespace narpa {
@@ -111,9 +111,8 @@ Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunO
     if (auto done = (*emulator)->run(stop); !done) return done.error();
 
     LoopRun run{name, load, {}, {}, (*emulator)->page_faults(), (*emulator)->notices()};
-    for (const CameraSensor* camera : (*emulator)->sensors_of<CameraSensor>())
-        run.cameras.push_back(of(*camera, scene.render));
-    for (const LidarSensor* lidar : (*emulator)->sensors_of<LidarSensor>())
+    for (const CameraSensor* camera : (*emulator)->cameras()) run.cameras.push_back(of(*camera, scene.render));
+    for (const LidarSensor* lidar : (*emulator)->lidars())
         run.lidars.push_back({std::string(lidar->name()), lidar->stats(), lidar->report()});
     return run;
 }

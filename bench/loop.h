@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "emulator/camera_sensor.h"
+#include "emulator/camera/camera_sensor.h"
 #include "emulator/emulator.h"
-#include "emulator/lidar_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
 
 namespace narpa {
 

@@ -9,7 +9,7 @@
 #include "base/constants.h"
 #include "base/time.h"
 #include "bench/statistics.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "renderer/camera/scene_camera.h"
 
 namespace narpa {

@@ -8,5 +8,5 @@ set(NARPA_PUBLIC_HEADERS
   renderer/scene/scene.h renderer/scene_file/scene_file.h renderer/geometry/tracer.h renderer/frame/camera_image.h
   renderer/camera/detector.h renderer/lidar/lidar_shot.h renderer/image/image_file.h
   estimator/pose/pose_estimate.h estimator/filter/pose_filter.h
-  emulator/emulator.h emulator/world.h
+  emulator/emulator.h emulator/world.h tracking/online_estimator.h
   rehearsal/scenario/scenario.h)

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <filesystem>
 #include <set>
 
-#include "emulator/camera_sensor.h"
-#include "emulator/lidar_sensor.h"
+#include "emulator/camera/camera_sensor.h"
 #include "emulator/log/run_record.h"
 #include "emulator/threads.h"
 
@@ -56,142 +56,13 @@ Status check_destinations(const RunOptions& options) {
     return Ok{};
 }
 
-/// Opens the sinks of sensor `index`, in the order in which they were given.
-template <class Sink>
-Result<std::vector<std::unique_ptr<Sink>>> open_sinks(
-    const std::vector<std::pair<std::string, std::string>>& outputs, std::size_t index, const auto& sensors,
-    std::string_view kind, const std::string& file, const auto& open) {
-    std::vector<std::unique_ptr<Sink>> sinks;
-    for (const auto& [name, spec] : outputs) {
-        auto named = sensor_named(sensors, name, kind, file);
-        if (!named) return named.error();
-        if (*named != index) continue;
-        Result<std::unique_ptr<Sink>> sink = open(spec);
-        if (!sink) return sink.error();
-        sinks.push_back(*std::move(sink));
-    }
-    return sinks;
-}
-
-/// The settings that readers of the camera's frames may change. Their requests are handled like commands on CAN, so
-/// without a bus there are none.
-std::optional<VideoControls> controls_of(const Camera& c, bool has_bus) {
-    if (!c.control || !has_bus) return std::nullopt;
-    const CameraSettings s = settings_of(c);
-    return VideoControls{c.control->exposure_min_ns,
-                         std::min(c.control->exposure_max_ns, c.period_ns - rows_ns(c) - 1),
-                         s.exposure_ns,
-                         c.control->gain_max_cdb,
-                         s.gain_cdb,
-                         s.auto_exposure};
-}
-
-Result<std::unique_ptr<Sensor>> open_camera(const World& world, std::size_t index, const RunOptions& o,
-                                            bool telemetry) {
-    const Scene& scene = world.scene();
-    const Camera& c = scene.cameras[index];
-    const VideoFormat format{c.width, c.height, c.format, c.period_ns};
-    const WhenFull when_full = o.lockstep ? WhenFull::wait : WhenFull::drop;
-    const auto controls = controls_of(c, !o.bus.empty());
-    auto sinks = open_sinks<VideoSink>(
-        o.video, index, scene.cameras, "camera", scene.file,
-        [&](const std::string& spec) { return open_video_sink(spec, format, when_full, controls); });
-    if (!sinks) return sinks.error();
-    if (sinks->empty()) return std::unique_ptr<Sensor>();
-    auto camera = std::make_unique<CameraSensor>(world, index, *std::move(sinks));
-    if (telemetry) camera->keep_ledgers();
-    return std::unique_ptr<Sensor>(std::move(camera));
-}
-
-Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file) {
-    if (!has_bus) return Error{fmt::format("--lidar {}=can needs --can BUS", lidar.name)};
-    const LidarSpec& spec = lidar.model->spec();
-    const double shots_hz =
-        1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
-    if (shots_hz <= LidarSensor::kMaxBeams_hz) return Ok{};
-    return Error{
-        fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
-                    "frames)",
-                    lidar.name, shots_hz, LidarSensor::kMaxBeams_hz),
-        file};
-}
-
-Result<std::unique_ptr<Sensor>> open_lidar(const World& world, std::size_t index, const RunOptions& o,
-                                           bool /*telemetry*/) {
-    const Scene& scene = world.scene();
-    auto packets = o.lidar;
-    const auto to_can = [&](const auto& output) {
-        return output.second == "can" && output.first == scene.lidars[index].name;
-    };
-    const bool beams = std::erase_if(packets, to_can) > 0;
-    if (beams)
-        if (auto good = check_beams_on_can(scene.lidars[index], !o.bus.empty(), scene.file); !good)
-            return good.error();
-    auto sinks =
-        open_sinks<PacketSink>(packets, index, scene.lidars, "LiDAR", scene.file, [&](const std::string& spec) {
-            const LidarModel& model = *scene.lidars[index].model;
-            return open_packet_sink(spec, model.spec().network, scene.epoch_unix_ns, o.lockstep, model.metadata());
-        });
-    if (!sinks) return sinks.error();
-    if (sinks->empty() && !beams) return std::unique_ptr<Sensor>();
-    auto lidar = std::make_unique<LidarSensor>(world, index, *std::move(sinks), o.log_shots);
-    if (beams) lidar->keep_beams();
-    return std::unique_ptr<Sensor>(std::move(lidar));
-}
-
-/// The sensors for which the options name sinks; a new kind is opened here. `telemetry`: they keep ledgers for the
-/// CAN bus. Errors name sensor, sink or file.
-Result<std::vector<std::unique_ptr<Sensor>>> open_sensors(const World& world, const RunOptions& options,
-                                                          bool telemetry) {
-    const Scene& scene = world.scene();
-    if (!options.video.empty() && scene.cameras.empty()) return Error{"the scene has no camera", scene.file};
-    if (!options.lidar.empty() && scene.lidars.empty()) return Error{"the scene has no LiDAR", scene.file};
-    std::vector<std::unique_ptr<Sensor>> sensors;
-    for (const auto& [count, open] :
-         {std::pair{scene.cameras.size(), &open_camera}, std::pair{scene.lidars.size(), &open_lidar}}) {
-        for (std::size_t i = 0; i < count; ++i) {
-            auto sensor = open(world, i, options, telemetry);
-            if (!sensor) return sensor.error();
-            if (*sensor) sensors.push_back(*std::move(sensor));  // a sensor without a sink costs nothing
-        }
-    }
-    return sensors;
-}
-
-/// The estimator of the options, attached to its camera among `sensors`.
-Result<std::unique_ptr<OnlineEstimator>> open_estimator(const World& world, const RunOptions& options,
-                                                        const std::vector<std::unique_ptr<Sensor>>& sensors,
-                                                        bool telemetry) {
-    const Scene& scene = world.scene();
-    std::vector<CameraSensor*> cameras;
-    for (const auto& sensor : sensors)
-        if (auto* camera = dynamic_cast<CameraSensor*>(sensor.get())) cameras.push_back(camera);
-    if (cameras.empty())
-        return Error{"--estimate needs a camera, expected --video CAMERA=SINK too (SINK may be none)"};
-    const std::string name =
-        options.estimate_camera.empty() ? std::string(cameras.front()->name()) : options.estimate_camera;
-    const auto index = sensor_named(scene.cameras, name, "camera", scene.file);
-    if (!index) return index.error();
-    for (CameraSensor* camera : cameras) {
-        if (camera->name() != name) continue;
-        auto tracker = FrameTracker::create(world, *index, *options.estimate);
-        if (!tracker) return tracker.error();
-        auto estimator = std::make_unique<OnlineEstimator>(*std::move(tracker), world, *index, options.lockstep);
-        if (telemetry) estimator->keep_reports();
-        camera->show_to(*estimator);
-        return estimator;
-    }
-    return Error{fmt::format("--estimate {}: this camera has no sink, expected --video {}=SINK too", name, name)};
-}
-
 }  // namespace
 
 Emulator::Emulator() = default;
 Emulator::~Emulator() = default;
 
-Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions& options) {
-    if (options.video.empty() && options.lidar.empty())
-        return Error{"no output, expected at least one --video CAMERA=SINK or --lidar LIDAR=SINK"};
+Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions& options,
+                                                   std::span<const SensorKind> kinds) {
     if (options.lockstep && options.bus.empty())
         return Error{"--lockstep needs --can BUS: the clock advances only with commands"};
     if (auto good = check_budget(scene, options); !good) return good.error();
@@ -203,6 +74,7 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
 
     std::unique_ptr<Emulator> emulator(new Emulator);
     emulator->options_ = options;
+    emulator->kinds_ = kinds;
     emulator->world_ = *std::move(world);
     if (options.duration_s > 0) emulator->end_ns_ = std::llround(options.duration_s * 1e9);
     emulator->threads_ = std::make_unique<TracingThreads>(options.threads, options.cpus);
@@ -222,21 +94,30 @@ Status Emulator::open() {
         if (!bus) return bus.error();
         bus_ = *std::move(bus);
     }
-    auto sensors = open_sensors(*world_, options_, bus_ != nullptr);
-    if (!sensors) return sensors.error();
-    sensors_ = *std::move(sensors);
-    if (options_.estimate) {
-        auto estimator = open_estimator(*world_, options_, sensors_, bus_ != nullptr);
-        if (!estimator) return estimator.error();
-        estimator_ = *std::move(estimator);
-    }
+    for (const SensorKind& kind : kinds_)
+        if (auto opened = kind.open(*world_, options_, sensors_); !opened) return opened;
+    if (sensors_.all.empty())
+        return Error{"no output, expected at least one --video CAMERA=SINK or --lidar LIDAR=SINK"};
+    if (auto opened = open_observers(); !opened) return opened;
     if (logs)  // last, so that a run that cannot start keeps the log of an earlier one
         if (auto opened = open_logs(); !opened) return opened;
     if (!bus_) return Ok{};
     can_ = std::make_unique<CanNode>(*world_, *bus_, can_log_.get(), options_.lockstep);
-    for (const auto& sensor : sensors_)
-        if (auto* camera = dynamic_cast<CameraSensor*>(sensor.get()); camera && camera->control())
-            can_->operate(*camera->control());
+    for (const auto& sensor : sensors_.all) sensor->connect(*can_);
+    return Ok{};
+}
+
+Status Emulator::open_observers() {
+    std::vector<std::size_t> cameras;
+    for (const CameraSensor* camera : sensors_.cameras) cameras.push_back(camera->index());
+    for (const OpenFrameObserver& open : options_.observers) {
+        auto observer = open(*world_, cameras, options_.lockstep);
+        if (!observer) return observer.error();
+        const auto camera = std::ranges::find(sensors_.cameras, (*observer)->camera(), &CameraSensor::index);
+        assert(camera != sensors_.cameras.end() && "an observer's camera has a sink");
+        observers_.push_back(std::make_unique<FrameFeed>(*std::move(observer), *world_, options_.lockstep));
+        (*camera)->feed(*observers_.back());
+    }
     return Ok{};
 }
 
@@ -244,10 +125,10 @@ Status Emulator::open_logs() {
     const std::string& folder = options_.log_folder;
     if (auto removed = remove_run(folder); !removed) return removed;
     if (auto recorded = write_run_record(folder, world_->scene()); !recorded) return recorded;
-    for (const auto& sensor : sensors_)
+    for (const auto& sensor : sensors_.all)
         if (auto opened = sensor->log_to(folder, options_.lockstep); !opened) return opened;
-    if (estimator_)
-        if (auto opened = estimator_->log_to(folder); !opened) return opened;
+    for (const auto& feed : observers_)
+        if (auto opened = feed->observer().log_to(folder, options_.lockstep); !opened) return opened;
     if (!bus_) return Ok{};
     auto log = RowLog::create(folder + "/can.log", "", options_.lockstep, CanNode::kLogLines);
     if (!log) return log.error();
@@ -306,8 +187,8 @@ Status Emulator::run(const StopFlag& stop) {
     const auto keep_first = [&](const Status& done) {
         if (!done && status) status = done.error();
     };
-    for (const auto& sensor : sensors_) keep_first(sensor->finish());
-    if (estimator_) keep_first(estimator_->finish());
+    for (const auto& sensor : sensors_.all) keep_first(sensor->finish());
+    for (const auto& feed : observers_) keep_first(feed->observer().finish());
     if (can_log_) keep_first(can_log_->close());
     return status;
 }

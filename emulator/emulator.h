@@ -2,46 +2,28 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "base/result.h"
 #include "base/stop.h"
-#include "emulator/can_node.h"
-#include "emulator/online_estimator.h"
+#include "emulator/bus/can_node.h"
 #include "emulator/realtime.h"
-#include "emulator/sensor.h"
+#include "emulator/sensor_kind.h"
 
 namespace narpa {
 
 struct TracingThreads;
 
-struct RunOptions {
-    std::string bus;                                                ///< BUS; empty: no commands
-    std::vector<std::pair<std::string, std::string>> video, lidar;  ///< sensor name and SINK; a name may repeat
-    bool lockstep = false;
-    double duration_s = 0;   ///< of simulation time; 0: until stopped or until a recorded bus ends
-    std::string log_folder;  ///< empty: no log
-    bool log_shots = false;  ///< logs the truth of every LiDAR shot too, at the cost of a second ray for each
-    int threads = 0;         ///< tracing threads; 0: one per core, or one per entry of `cpus`
-    std::vector<int> cpus;   ///< processors that tracing threads are bound to in real time; empty: any
-    std::optional<TrackerOptions> estimate{};              ///< estimate a target's pose during the run
-    std::string estimate_camera;                           ///< empty: the first camera with a sink
-    std::function<void(const std::string&)> on_refusal{};  ///< in lockstep, once, when CanNode::refuses_poses
-};
-
 class Emulator {
 public:
     /// Opens everything and allocates all memory that the loop needs.
-    static Result<std::unique_ptr<Emulator>> create(Scene scene, const RunOptions& options);
+    static Result<std::unique_ptr<Emulator>> create(Scene scene, const RunOptions& options,
+                                                    std::span<const SensorKind> kinds = sensor_kinds());
     ~Emulator();
 
-    /// Adds to the table of sensors. Before `run`.
-    void add_sensor(std::unique_ptr<Sensor> sensor) { sensors_.push_back(std::move(sensor)); }
     /// Runs until the duration is over, the bus has ended or the flag is set; then flushes everything. Returns the
     /// first error of a file that could not be written.
     Status run(const StopFlag& stop);
@@ -49,17 +31,11 @@ public:
     [[nodiscard]] const World& world() const noexcept { return *world_; }
     [[nodiscard]] CanNode* can() noexcept { return can_.get(); }
     [[nodiscard]] const CanNode* can() const noexcept { return can_.get(); }
-    [[nodiscard]] const std::vector<std::unique_ptr<Sensor>>& sensors() const noexcept { return sensors_; }
-    /// The sensors of one kind, in the table's order.
-    template <class Kind>
-    [[nodiscard]] std::vector<const Kind*> sensors_of() const {
-        std::vector<const Kind*> found;
-        for (const auto& sensor : sensors_)
-            if (const auto* one = dynamic_cast<const Kind*>(sensor.get())) found.push_back(one);
-        return found;
-    }
-    /// Null without RunOptions::estimate.
-    [[nodiscard]] const OnlineEstimator* estimator() const noexcept { return estimator_.get(); }
+    [[nodiscard]] std::span<const SensorKind> kinds() const noexcept { return kinds_; }
+    [[nodiscard]] const std::vector<std::unique_ptr<Sensor>>& sensors() const noexcept { return sensors_.all; }
+    [[nodiscard]] const std::vector<CameraSensor*>& cameras() const noexcept { return sensors_.cameras; }
+    [[nodiscard]] const std::vector<LidarSensor*>& lidars() const noexcept { return sensors_.lidars; }
+    [[nodiscard]] const std::vector<std::unique_ptr<FrameFeed>>& observers() const noexcept { return observers_; }
     [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
     /// Simulation time reached. From any thread.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_.load(std::memory_order_relaxed); }
@@ -79,6 +55,7 @@ private:
 
     Emulator();
     Status open();
+    Status open_observers();
     /// Replaces the logs of an earlier run in the folder.
     Status open_logs();
 
@@ -86,9 +63,9 @@ private:
     void become_real_time(const char* name, int priority);
     void run_sensor(Sensor& sensor, RealTimeRun& run, const StopFlag& stop);
     void run_bus(RealTimeRun& run, const StopFlag& stop);
-    void run_estimator(const StopFlag& stop);
+    void run_observer(FrameFeed& feed, const StopFlag& stop);
 
-    /// Send on the CAN bus, if any: what sensors and estimator have gathered; the state, with the faults since the
+    /// Send on the CAN bus, if any: what sensors and observers have gathered; the state, with the faults since the
     /// last heartbeat. One thread calls them.
     void send_telemetry(std::int64_t t_ns) noexcept;
     void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
@@ -106,8 +83,9 @@ private:
     std::unique_ptr<CanBus> bus_;
     std::unique_ptr<RowLog> can_log_;
     std::unique_ptr<CanNode> can_;
-    std::vector<std::unique_ptr<Sensor>> sensors_;
-    std::unique_ptr<OnlineEstimator> estimator_;
+    std::span<const SensorKind> kinds_;
+    OpenSensors sensors_;
+    std::vector<std::unique_ptr<FrameFeed>> observers_;
     Heartbeat faults_{};  ///< since the last heartbeat
     std::uint64_t drops_reported_ = 0;
     std::unique_ptr<TracingThreads> threads_;

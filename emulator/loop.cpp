@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <barrier>
+#include <cassert>
 #include <thread>
 
 #include "base/time.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
 #include "emulator/threads.h"
-#include "estimator/features/feature_matcher.h"
 
 namespace narpa {
 namespace {
@@ -58,14 +58,14 @@ struct Emulator::RealTimeRun {
 
 void Emulator::send_telemetry(std::int64_t t_ns) noexcept {
     if (!can_) return;
-    for (const auto& sensor : sensors_) sensor->send_telemetry(*can_, t_ns, faults_);
-    for (EstimateReport report; estimator_ && estimator_->reports().pop(report);) can_->send(report, t_ns);
+    for (const auto& sensor : sensors_.all) sensor->send_telemetry(*can_, t_ns, faults_);
+    for (const auto& feed : observers_) feed->observer().send_telemetry(*can_, t_ns);
 }
 
 void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
     if (!can_) return;
     std::uint64_t drops = 0;
-    for (const auto& sensor : sensors_) drops += sensor->drops();
+    for (const auto& sensor : sensors_.all) drops += sensor->drops();
     Heartbeat heartbeat = std::exchange(faults_, {});
     heartbeat.t_ns = t_ns;
     heartbeat.state = state;
@@ -79,14 +79,16 @@ void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
     threads_->make_real_time(kTracingPriority);
-    RealTimeRun run(1 + sensors_.size() + (can_ ? 1 : 0));
+    RealTimeRun run(1 + sensors_.all.size() + (can_ ? 1 : 0));
     run.clock.end_at(end_ns_);
-    StopFlag sensors_done{false}, estimator_done{false};
-    std::thread bus, estimator;
-    if (can_) bus = std::thread([&] { run_bus(run, estimator_done); });
-    if (estimator_) estimator = std::thread([&] { run_estimator(sensors_done); });
-    std::vector<std::thread> sensors;
-    for (const auto& sensor : sensors_) sensors.emplace_back([&, s = sensor.get()] { run_sensor(*s, run, stop); });
+    StopFlag sensors_done{false}, observers_done{false};
+    std::thread bus;
+    if (can_) bus = std::thread([&] { run_bus(run, observers_done); });
+    std::vector<std::thread> sensors, observers;
+    for (const auto& feed : observers_)
+        observers.emplace_back([&, f = feed.get()] { run_observer(*f, sensors_done); });
+    for (const auto& sensor : sensors_.all)
+        sensors.emplace_back([&, s = sensor.get()] { run_sensor(*s, run, stop); });
     run.start.arrive_and_wait();
     (void)run.clock.wait_until(0, stop);
     const PageFaults before = narpa::page_faults();
@@ -94,8 +96,9 @@ void Emulator::run_real_time(const StopFlag& stop) {
     const PageFaults after = narpa::page_faults();
     page_faults_ = {after.minor - before.minor, after.major - before.major};
     sensors_done = true;
-    if (estimator.joinable()) estimator_->wake(), estimator.join();
-    estimator_done = true;
+    for (const auto& feed : observers_) feed->wake();
+    for (std::thread& t : observers) t.join();
+    observers_done = true;
     if (bus.joinable()) bus.join();
     t_ns_ = std::min(run.clock.now_ns(), run.clock.end_ns());
 }
@@ -111,7 +114,8 @@ void Emulator::run_sensor(Sensor& sensor, RealTimeRun& run, const StopFlag& stop
     become_real_time(thread.name, thread.priority);
     // The first sensor that needs the tracing threads waits until all of them are there.
     const auto traces = [](const auto& s) { return s->thread().in_arena; };
-    if (&sensor == std::ranges::find_if(sensors_, traces)->get()) threads_->gather();
+    const auto first = std::ranges::find_if(sensors_.all, traces);
+    if (first != sensors_.all.end() && &sensor == first->get()) threads_->gather();
     execute(sensor, *threads_, [&] { sensor.warm_up(); });
     run.start.arrive_and_wait();
     while (wait_for_item(sensor, run.clock, stop)) {
@@ -146,11 +150,10 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
 }
 
 /// Without real-time priority, on one thread: it uses the time that the sensors leave.
-void Emulator::run_estimator(const StopFlag& stop) {
-    name_thread("narpa-estimate");
-    const SingleThreadedOpenCv pictures;  // workers with the sensors' priority would delay the sensors
+void Emulator::run_observer(FrameFeed& feed, const StopFlag& stop) {
+    name_thread(("narpa-" + std::string(feed.observer().name())).c_str());
     tbb::task_arena alone(1);
-    alone.execute([&] { estimator_->run(stop); });
+    alone.execute([&] { feed.run(stop); });
 }
 
 // --- Lockstep ------------------------------------------------------------
@@ -182,7 +185,7 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             for (const std::string& what : refusals()) options_.on_refusal(what);
         if (!moved || !can_->commanded()) continue;
         if (!std::exchange(started, true))
-            for (const auto& sensor : sensors_) sensor->start_at(can_->first_ns());
+            for (const auto& sensor : sensors_.all) sensor->start_at(can_->first_ns());
         advance_to(std::min(can_->granted_ns(), end_ns_), clock, stop);
         send_heartbeat(t_ns(), RunState::lockstep);
     }
@@ -193,10 +196,11 @@ void Emulator::run_lockstep(const StopFlag& stop) {
 void Emulator::advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFlag& stop) {
     const auto last_pose = [](const auto& sensor) { return sensor->last_pose_ns(); };
     while (!stop.load(std::memory_order_relaxed)) {
-        for (const auto& sensor : sensors_) sensor->plan();
-        Sensor& next = **std::ranges::min_element(sensors_, {}, last_pose);
+        for (const auto& sensor : sensors_.all) sensor->plan();
+        Sensor& next = **std::ranges::min_element(sensors_.all, {}, last_pose);
         const std::int64_t t_pose = next.last_pose_ns();
         if (t_pose > t_ns || t_pose >= clock.end_ns()) break;
+        assert(next.due_ns() >= t_pose && "an item is made once its poses are known");
         clock.set(next.due_ns());
         execute(next, *threads_, [&] { next.make_next(clock); });
         send_telemetry(t_pose);

@@ -1,5 +1,6 @@
 #include "emulator/pose_track.h"
 
+#include <cassert>
 #include <cstring>
 
 #include "base/time.h"
@@ -73,6 +74,7 @@ PoseTrack::Found PoseTrack::bracket(std::int64_t t_ns, Sample& before, Sample& a
 }
 
 Motion PoseTrack::interpolate(const Sample& a, const Sample& b, std::int64_t t_ns) const noexcept {
+    assert(a.t_ns < b.t_ns && a.t_ns <= t_ns && t_ns <= b.t_ns);
     const double h = static_cast<double>(b.t_ns - a.t_ns) * kSecondsPerNs;
     const double u = static_cast<double>(t_ns - a.t_ns) / static_cast<double>(b.t_ns - a.t_ns), u2 = u * u;
     const Rigid3 &Ta = a.motion.T_world_body, &Tb = b.motion.T_world_body;

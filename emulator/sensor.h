@@ -1,10 +1,8 @@
 /// emulator/sensor.h - what the loop runs: an instrument that makes one item (frame, packet) after another, each at
-/// its due time. A new kind of sensor implements this interface and is added to the table (Emulator::add_sensor);
-/// the loop stays as it is.
+/// its due time. The kinds are in sensor_kind.h.
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
@@ -62,11 +60,19 @@ public:
     /// Makes the next item, hands it to the sinks and counts it. In real time, skips the items that are too late.
     virtual void make_next(const Clock& clock) = 0;
 
+    /// Registers what it receives over CAN. Called once before the run, if there is a bus, which outlives it.
+    virtual void connect(CanNode& /*can*/) {}
     /// Sends what has gathered for the CAN bus since the last call and adds its faults to the next heartbeat. From
     /// the CAN thread, beside make_next.
     virtual void send_telemetry(CanNode& /*can*/, std::int64_t /*t_ns*/, Heartbeat& /*faults*/) noexcept {}
     /// Items that sinks have dropped so far. From any thread.
     [[nodiscard]] virtual std::uint64_t drops() const noexcept { return 0; }
+
+    /// Items made. After the run.
+    [[nodiscard]] virtual std::uint64_t made() const noexcept = 0;
+    /// Why the run has failed, and how it would keep up: a sentence each; empty: it has not, it does.
+    [[nodiscard]] virtual std::string failure() const { return {}; }
+    [[nodiscard]] virtual std::string advice() const { return {}; }
 
     /// After the run: flushes sinks and logs. Returns the first file that could not be written.
     virtual Status finish() = 0;
@@ -75,23 +81,5 @@ public:
     [[nodiscard]] virtual nlohmann::json report() const = 0;
     [[nodiscard]] virtual std::string to_text(bool lockstep) const = 0;
 };
-
-/// Flushes the sinks. Returns the first file that could not be written.
-template <class Sink>
-Status finish_all(const std::vector<std::unique_ptr<Sink>>& sinks) {
-    Status first = Ok{};
-    for (const auto& sink : sinks) {
-        sink->flush();
-        if (first) first = sink->failure();
-    }
-    return first;
-}
-
-template <class Sink>
-[[nodiscard]] std::vector<std::string> descriptions(const std::vector<std::unique_ptr<Sink>>& sinks) {
-    std::vector<std::string> texts;
-    for (const auto& sink : sinks) texts.push_back(sink->description());
-    return texts;
-}
 
 }  // namespace narpa

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cassert>
 #include <utility>
 
 #include "protocols/video/embedded_line.h"
@@ -80,12 +81,14 @@ Status World::load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_n
 }
 
 TrackedPose World::pose(std::size_t body, std::int64_t t_ns) const noexcept {
+    assert(body < tracks_.size());
     if (tracks_[body]) return tracks_[body]->at(t_ns);
     return {motion_at(scene_.bodies[body], static_cast<double>(t_ns) * 1e-9), 0, 0, false, false};
 }
 
 PlacementSource World::place(std::int64_t t_ns, int rider, BodyPoses& out,
                              std::span<Motion> motions) const noexcept {
+    assert(out.T_world_body.size() == scene_.bodies.size() && rider < static_cast<int>(scene_.bodies.size()));
     PlacementSource source;
     bool named = false;
     for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
@@ -103,6 +106,7 @@ PlacementSource World::place(std::int64_t t_ns, int rider, BodyPoses& out,
 }
 
 void World::place_moving(std::int64_t start_ns, std::int64_t end_ns, BodyPoses& out) const noexcept {
+    assert(start_ns <= end_ns);
     for (const std::size_t i : moving_)
         out.set(i, pose(i, start_ns).motion.T_world_body, pose(i, end_ns).motion.T_world_body);
 }

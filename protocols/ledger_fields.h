@@ -42,6 +42,7 @@ inline constexpr double kSamplesPerPixelSteps = 256;  ///< of one sample
 inline constexpr auto kLedgerSteps = numbered(kStepNames);
 inline constexpr auto kLedgerBudgetKinds = numbered(kBudgetKinds);
 inline constexpr auto kLedgerDeliveries = numbered(kDeliveries);
+inline constexpr auto kLedgerTriggers = numbered(kTriggerModes);
 
 // clang-format off
 /// First those of the CAN message, in the order of the DBC. The last are on CAN in a message of their own, CameraState.
@@ -94,7 +95,7 @@ inline constexpr std::array<LedgerField, 31> kLedgerFields{{
     {&FrameLedger::budget, 19, "budget", 40, 0,
      {"Budget", "", "Samples a pixel, rays, or nanoseconds: see BudgetKind", 1, false, {9, 0, 40}, {0, 432, 40}}},
     {&FrameLedger::command_counter, 21, "command_counter", 11, 0, {}},
-    {&FrameLedger::trigger, 22, "trigger", 155, 0, {.choices = kTriggerModeChoices}},
+    {&FrameLedger::trigger, 22, "trigger", 155, 0, {.choices = kLedgerTriggers}},
     {&FrameLedger::gain_cdb, 23, "gain_cdb", 152, 0, {}},
     {&FrameLedger::binning, 24, "binning", 154, 0, {}},
     {&FrameLedger::region_x, 25, "region_x", 144, 0, {}},
@@ -103,20 +104,6 @@ inline constexpr std::array<LedgerField, 31> kLedgerFields{{
     {&FrameLedger::region_height, 28, "region_height", 150, 0, {}},
 }};
 // clang-format on
-
-inline constexpr auto kLedgerSignals = [] {
-    std::array<Signal, 23> signals{};
-    std::transform(kLedgerFields.begin(), kLedgerFields.begin() + signals.size(), signals.begin(),
-                   [](const LedgerField& field) { return field.signal; });
-    return signals;
-}();
-
-inline constexpr std::array<std::string_view, 10> kLedgerFrames{
-    "LedgerFrame",    "LedgerExposureMid", "LedgerPoseTime", "LedgerExposure", "LedgerRender",
-    "LedgerHandOver", "LedgerQuality",     "LedgerSamples",  "LedgerRays",     "LedgerBudget"};
-
-inline constexpr SetLayout kLedgerLayout{"Ledger", "Time ledger of one camera frame", kLedgerFrames, kLedgerSignals,
-                                         472};
 
 /// The fields of the CSV log, in its order.
 inline constexpr auto kLedgerColumns = [] {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cassert>
 #include <cerrno>
 #include <cstring>
 
@@ -27,6 +28,7 @@ RowLog::~RowLog() {
 }
 
 void RowLog::append(std::string_view line) noexcept {
+    assert(line.empty() || line.back() == '\n');
     queue_->push({reinterpret_cast<const std::uint8_t*>(line.data()), line.size()});
 }
 

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "base/result.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "emulator/log/row_log.h"
 
 namespace narpa {

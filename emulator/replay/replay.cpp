@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "emulator/camera_control.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_control.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/log/run_record.h"
 #include "protocols/video/embedded_line.h"
 #include "renderer/camera/detector.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/replay/image_compare.h"
 #include "emulator/world.h"

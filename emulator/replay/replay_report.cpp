@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "emulator/report.h"
+#include "emulator/log/statistics.h"
 #include "plot/plot.h"
 
 namespace narpa {

@@ -6,8 +6,6 @@
 #include <cstddef>
 #include <string_view>
 
-#include "protocols/can/messages.h"
-
 namespace narpa {
 namespace {
 
@@ -58,12 +56,9 @@ private:
     std::string id_{};
 };
 
-struct Route {
-    std::string_view sender, receiver;
-};
-
-void write_set(Sections& out, const SetLayout& layout, const std::string& prefix, std::uint32_t base_id,
-               Route route) {
+void write_set(Sections& out, const SetLayout& layout, const std::string& prefix, std::uint32_t which) {
+    const std::uint32_t base_id = layout.base_id_of(which);
+    const Route& route = layout.route;
     for (std::size_t frame = 0; frame < layout.frames.size(); ++frame) {
         out.begin_message(base_id + static_cast<std::uint32_t>(frame), prefix + std::string(layout.frames[frame]),
                           kClassicBytes, route.sender, layout.comment, false);
@@ -87,25 +82,16 @@ void write_set(Sections& out, const SetLayout& layout, const std::string& prefix
 
 }  // namespace
 
-std::string write_dbc(std::span<const CanBody> bodies, int cameras) {
+std::string write_dbc(std::span<const CanBody> bodies, int cameras, std::span<const SetLayout* const> messages) {
     Sections out;
-    const Route command{"Commander", "narpa"}, telemetry{"narpa", "Commander"},
-        navigation{"Navigation", "Commander"}, dynamics{"Commander", "Navigation"};
-    for (const CanBody& body : bodies) write_set(out, kPoseLayout, symbol(body.name) + "_", body.base_id, command);
-    for (int i = 0; i < cameras; ++i)
-        write_set(out, kLedgerLayout, "Camera" + std::to_string(i) + "_",
-                  ledger_base_id(static_cast<std::uint8_t>(i)), telemetry);
-    write_set(out, kEstimateLayout, "", kEstimateBaseId, telemetry);
-    write_set(out, kHeartbeatLayout, "", kHeartbeatId, telemetry);
-    write_set(out, kCameraCommandLayout, "", kCameraCommandBaseId, command);
-    write_set(out, kCameraTriggerLayout, "", kCameraTriggerBaseId, command);
-    write_set(out, kCameraReplyLayout, "", kCameraReplyBaseId, telemetry);
-    write_set(out, kCameraStateLayout, "", kCameraStateBaseId, telemetry);
-    write_set(out, kLidarBeamLayout, "", kLidarBeamBaseId, telemetry);
-    write_set(out, kActuatorLayout, "", kActuatorBaseId, navigation);
-    write_set(out, kNavigationLayout, "", kNavigationBaseId, navigation);
-    write_set(out, kAttitudeLayout, "", kAttitudeBaseId, dynamics);
-    write_set(out, kDynamicsLayout, "", kDynamicsBaseId, dynamics);
+    for (const SetLayout* m : messages) {
+        if (m->instances == Instances::one) write_set(out, *m, "", 0);
+        if (m->instances == Instances::per_body)
+            for (const CanBody& body : bodies) write_set(out, *m, symbol(body.name) + "_", body.base_id);
+        if (m->instances == Instances::per_camera)
+            for (int i = 0; i < cameras; ++i)
+                write_set(out, *m, "Camera" + std::to_string(i) + "_", static_cast<std::uint32_t>(i));
+    }
     return "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: Commander narpa Navigation\n\n" + out.messages +
            "CM_ \"narpa on CAN. The most negative raw value of a signed signal means: not available.\";\n" +
            out.comments +

@@ -1,16 +1,17 @@
-/// protocols/can/dbc.h - the DBC file of a scene's CAN messages, from the tables of signals.h.
+/// protocols/can/dbc.h - the DBC file of a scene's CAN messages, from their descriptions.
 #pragma once
 
 #include <span>
 #include <string>
 
-#include "protocols/can/identifiers.h"
+#include "protocols/can/messages.h"
 
 namespace narpa {
 
-/// Pose messages of each body, ledger messages of each camera (named Camera0, Camera1, ...), estimate, heartbeat
-/// and the messages of a closed loop. Characters of a body's name other than letters, digits and _ become _. CAN FD
-/// messages have VFrameFormat = StandardCAN_FD.
-[[nodiscard]] std::string write_dbc(std::span<const CanBody> bodies, int cameras = 1);
+/// Messages of each body (named after it) and of each camera (Camera0, Camera1, ...), and those that exist once.
+/// Characters of a body's name other than letters, digits and _ become _. CAN FD messages have VFrameFormat =
+/// StandardCAN_FD.
+[[nodiscard]] std::string write_dbc(std::span<const CanBody> bodies, int cameras = 1,
+                                    std::span<const SetLayout* const> messages = can_messages());
 
 }  // namespace narpa

@@ -15,24 +15,4 @@ Status check_body_base_id(std::int64_t can_id) {
     return Error{.what = text.data()};
 }
 
-std::string message_name(std::uint32_t id, std::span<const CanBody> bodies) {
-    if (id == kHeartbeatId) return "heartbeat";
-    const std::uint32_t base = id - id % kBaseIdStep;
-    std::string name;
-    if (const auto camera = ledger_camera(id)) name = "ledger of camera " + std::to_string(*camera);
-    if (base == kEstimateBaseId) name = "emulator's estimate";
-    if (base == kActuatorBaseId) name = "thruster command";
-    if (base == kNavigationBaseId) name = "navigation estimate";
-    if (base == kAttitudeBaseId) name = "attitude report";
-    if (base == kDynamicsBaseId) name = "dynamics report";
-    if (base == kCameraCommandBaseId) name = "camera command";
-    if (base == kCameraTriggerBaseId) name = "camera trigger";
-    if (base == kCameraReplyBaseId) name = "camera reply";
-    if (base == kCameraStateBaseId) name = "camera state";
-    if (base == kLidarBeamBaseId) name = "LiDAR beam";
-    for (const CanBody& body : bodies)
-        if (base == body.base_id) name = "pose of " + body.name;
-    return name.empty() ? "frame" : name + ", part " + std::to_string(id % kBaseIdStep);
-}
-
 }  // namespace narpa

@@ -1,5 +1,6 @@
 #include "protocols/can/signal_set.h"
 
+#include <cassert>
 #include <utility>
 
 #include "protocols/can/crc.h"
@@ -82,6 +83,7 @@ FrameSet encode_classic(const SetLayout& layout, const RawSignals& raw, std::uin
 
 CanFrame encode_fd(const SetLayout& layout, const RawSignals& raw, std::uint8_t counter,
                    std::uint32_t base_id) noexcept {
+    assert(layout.fd_counter_bit != 0 && "the message has a CAN FD form");
     CanFrame frame;
     frame.id = base_id + kFdOffset;
     frame.fd = frame.bit_rate_switch = true;

@@ -5,7 +5,7 @@ On classic CAN a set is several frames of 8 bytes that take effect together, on 
 
     Pose (one for each body's can_id), Ledger (one for each camera), Heartbeat, Estimate,
     Attitude, Dynamics (from the dynamics), Actuator, Navigation (from the navigation),
-    CameraCommand, CameraTrigger (to cameras), CameraReply, CameraState (from them).
+    CameraCommand, CameraTrigger (to cameras), CameraReply, CameraState (from them), LidarBeam.
 """
 import time
 from dataclasses import dataclass

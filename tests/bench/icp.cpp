@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/icp.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"
 #include "renderer/scene_file/scene_file.h"

@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "drivers/can/remote_clock.h"
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 #include "emulator/log/row_log.h"
 #include "protocols/can/candump.h"
 #include "tests/emulator/loop_support.h"

@@ -1,6 +1,6 @@
 // A camera that is operated over CAN while it runs: settings act in the promised frame, triggers expose at their
 // time, and every frame states what it was taken with.
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 
 #include <numeric>
 #include <random>
@@ -59,8 +59,7 @@ protected:
         for (const std::string& camera : cameras) o.video.emplace_back(camera, folder_ / (camera + ".y4m").c_str());
         const auto emulator = ran(scene(scene_text), o);
         if (!emulator) return {};
-        for (const CameraSensor* camera : emulator->sensors_of<CameraSensor>())
-            counters_.push_back(camera->control()->counters());
+        for (const CameraSensor* camera : emulator->cameras()) counters_.push_back(camera->control()->counters());
         for (const auto& [cause, n] : emulator->can()->counters().rejected())
             if (n > 0) rejected_[cause] = n;
         return read_traffic();

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

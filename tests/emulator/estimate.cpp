@@ -6,8 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "emulator/camera_unit.h"
-#include "emulator/log/estimate_report.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/trajectory.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/projection/distortion.h"
@@ -15,6 +14,8 @@
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
 #include "tests/support/paths.h"
+#include "tracking/estimate_report.h"
+#include "tracking/online_estimator.h"
 
 namespace narpa::test {
 namespace {
@@ -63,20 +64,22 @@ protected:
         o.lockstep = true;
         o.log_folder = log;
         o.video = {{"nav", "none"}};
-        o.estimate = TrackerOptions{};
-        o.estimate->start_deg = o.estimate->start_percent = 3;
+        TrackerOptions options;
+        options.start_deg = options.start_percent = 3;
+        o.observers = {estimate_from("", options, &estimator_)};
         return ran(docking(), o);
     }
+    const OnlineEstimator* estimator_ = nullptr;
 };
 
 TEST_F(EstimateTest, EveryFrameOfALockstepRunIsLookedAt) {
     const std::string log = folder_ / "log";
     const auto emulator = fly(6, log);
     ASSERT_NE(emulator, nullptr);
-    ASSERT_NE(emulator->estimator(), nullptr);
-    const auto& frames = emulator->estimator()->frames();
+    ASSERT_NE(estimator_, nullptr);
+    const auto& frames = estimator_->frames();
     ASSERT_EQ(frames.size(), camera_of(*emulator).stats().frames);
-    EXPECT_EQ(emulator->estimator()->skipped(), 0u);
+    EXPECT_EQ(emulator->observers().front()->skipped(), 0u);
     for (const TrackedFrame& f : frames) {
         ASSERT_EQ(f.state, EstimateState::measured) << f.why;
         EXPECT_LT(error_between(*f.measured, f.truth).head<3>().norm(), 5e-3);
@@ -178,7 +181,7 @@ TEST_F(EstimateTest, GoesOutOnCan) {
     o.bus = "slcan:0";
     o.lockstep = true;
     o.video = {{"nav", "none"}};
-    o.estimate = TrackerOptions{};
+    o.observers = {estimate_from("", {}, &estimator_)};
     auto emulator = Emulator::create(docking(), o);
     ASSERT_TRUE(emulator) << emulator.error().text();
     StopFlag stop{false};
@@ -203,7 +206,7 @@ TEST_F(EstimateTest, GoesOutOnCan) {
     }
     stop = true;
     loop.join();
-    const auto& frames = (*emulator)->estimator()->frames();
+    const auto& frames = estimator_->frames();
     ASSERT_GE(reports.size(), 3u);
     ASSERT_GE(frames.size(), reports.size());
     for (std::size_t i = 0; i < reports.size(); ++i) {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "drivers/lidar/packet_source.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "protocols/little_endian.h"
 #include "rehearsal/navigation/sensor_inputs.h"
 #include "tests/emulator/loop_support.h"

@@ -2,7 +2,7 @@
 // then lateness is no matter of how fast the machine is.
 #include <algorithm>
 
-#include "emulator/camera_sensor.h"
+#include "emulator/camera/camera_sensor.h"
 #include "protocols/video/embedded_line.h"
 #include "tests/emulator/loop_support.h"
 

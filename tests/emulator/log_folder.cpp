@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "tests/emulator/loop_support.h"
+#include "tracking/online_estimator.h"
 
 namespace narpa::test {
 namespace {
@@ -47,8 +48,7 @@ TEST_F(LogFolder, ARunThatCannotStartLeavesTheLogOfAnEarlierOne) {
     RunOptions video = of_both_sensors(), lidar = of_both_sensors(), estimate = of_both_sensors();
     video.video[0].second = "/nowhere/at/all.y4m";
     lidar.lidar[0].second = "/nowhere/at/all.pcap";
-    estimate.estimate = TrackerOptions{};
-    estimate.estimate_camera = "aft";
+    estimate.observers = {estimate_from("aft", {})};
     for (const RunOptions& o : {video, lidar, estimate}) {
         EXPECT_FALSE(Emulator::create(scene(small_scene()), o));
         EXPECT_TRUE(files() == before);

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "drivers/can/can_bus.h"
-#include "emulator/camera_sensor.h"
+#include "emulator/camera/camera_sensor.h"
 #include "emulator/emulator.h"
-#include "emulator/lidar_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
 #include "protocols/can/messages.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/support/read_file.h"
@@ -66,10 +66,10 @@ inline std::vector<std::map<std::string, std::string>> read_rows(const std::stri
 
 /// The first camera and the first LiDAR of a run.
 inline const CameraSensor& camera_of(const Emulator& emulator) {
-    return *emulator.sensors_of<CameraSensor>().front();
+    return *emulator.cameras().front();
 }
 inline const LidarSensor& lidar_of(const Emulator& emulator) {
-    return *emulator.sensors_of<LidarSensor>().front();
+    return *emulator.lidars().front();
 }
 
 class LoopTest : public ::testing::Test {

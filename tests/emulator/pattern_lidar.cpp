@@ -6,7 +6,7 @@
 #include <random>
 
 #include "base/constants.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "protocols/lidar/point_packet.h"
 #include "tests/emulator/loop_support.h"
 

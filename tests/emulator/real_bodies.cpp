@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "emulator/camera_unit.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/camera/camera_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 #include "tests/support/temporary_folder.h"

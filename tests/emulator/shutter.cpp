@@ -1,7 +1,7 @@
 // Exposure in time: what moves is blurred about its place at mid-exposure, and each row has its own time.
 #include <gtest/gtest.h>
 
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

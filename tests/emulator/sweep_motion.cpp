@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "tests/emulator/loop_support.h"
 
 namespace narpa::test {

@@ -1,7 +1,7 @@
 // A telescope on the ground follows a station in orbit, over the time of a run.
 #include <gtest/gtest.h>
 
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/world.h"
 #include "tests/emulator/loop_support.h"
 

@@ -31,7 +31,7 @@ TEST(CanDbc, ShippedFileIsTheGeneratedOne) {
     if (generated == shipped_text()) return;
     const std::string path = test::build_path("narpa.dbc");
     std::ofstream(path) << generated;
-    ADD_FAILURE() << kDbcPath << " differs from what signals.h says; the new text is in " << path;
+    ADD_FAILURE() << kDbcPath << " differs from what the messages say; the new text is in " << path;
 }
 
 TEST(CanDbc, NamesBecomeSymbols) {

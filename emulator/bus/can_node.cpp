@@ -1,4 +1,4 @@
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 
 #include <algorithm>
 #include <cmath>
@@ -166,29 +166,8 @@ std::int64_t CanNode::latest_ns(const PoseTrack& track, std::int64_t t_now_ns) c
     return std::max({t_now_ns, t_recorded_ns, track.newest_ns()}) + ahead_max_ns_;
 }
 
-void CanNode::send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept {
-    for (const CanFrame& frame : encode(ledger, bus_.carries_fd())) put(frame, t_now_ns);
-}
-
-void CanNode::send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept {
-    for (const CanFrame& frame : encode(estimate, bus_.carries_fd())) put(frame, t_now_ns);
-}
-
-void CanNode::send(const CameraState& state, std::int64_t t_now_ns) noexcept {
-    for (const CanFrame& frame : encode(state, bus_.carries_fd())) put(frame, t_now_ns);
-}
-
-void CanNode::send(LidarBeamReport report, std::int64_t t_now_ns) noexcept {
-    report.counter = beam_counter_++;
-    for (const CanFrame& frame : encode(report, bus_.carries_fd())) put(frame, t_now_ns);
-}
-
-void CanNode::send(const CameraReply& reply, std::int64_t t_now_ns) noexcept {
-    for (const CanFrame& frame : encode(reply, bus_.carries_fd())) put(frame, t_now_ns);
-}
-
 void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
-    heartbeat.counter = heartbeat_counter_++;
+    heartbeat.counter = counter(kHeartbeatId)++;
     heartbeat_ = encode(heartbeat);
     put(heartbeat_, t_now_ns);
     log_left_out(t_now_ns);

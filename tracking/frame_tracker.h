@@ -1,4 +1,4 @@
-/// emulator/frame_tracker.h - the pose of a target from frame to frame, as a navigation computer would know it,
+/// tracking/frame_tracker.h - the pose of a target from frame to frame, as a navigation computer would know it,
 /// with the truth beside it.
 #pragma once
 

@@ -1,4 +1,4 @@
-#include "emulator/log/estimate_report.h"
+#include "tracking/estimate_report.h"
 
 #include <fmt/format.h>
 
@@ -87,7 +87,8 @@ std::string nees_verdict(double nees, double low, double high) {
 EstimateSummary summarise(std::span<const TrackedFrame> frames) {
     EstimateSummary s;
     s.frames = frames.size();
-    Squares turn, shift, part, filtered_turn, filtered_shift, turn_of_bound, shift_of_bound;
+    Squares rotation, position, position_of_range, filtered_rotation, filtered_position, rotation_of_bound,
+        position_of_bound;
     double nees = 0, nis = 0;
     std::size_t finite = 0, compared = 0;
     std::vector<double> ms;
@@ -98,21 +99,23 @@ EstimateSummary summarise(std::span<const TrackedFrame> frames) {
         if (f.answer.kind == AnswerKind::good && f.measured)
             s.beyond += !(normalised_error_squared(e.vector, f.covariance) <= kSixSigmaNees);
         if (f.state != EstimateState::lost)
-            filtered_turn.add(e.filtered_rotation()), filtered_shift.add(e.filtered_position());
+            filtered_rotation.add(e.filtered_rotation()), filtered_position.add(e.filtered_position());
         if (f.state != EstimateState::measured || !f.measured) continue;
         if (f.nis > 0) nis += f.nis, ++compared;
         ++s.measured;
-        turn.add(e.rotation()), shift.add(e.position()), part.add(e.position() / norm(f.truth.t));
+        rotation.add(e.rotation()), position.add(e.position()),
+            position_of_range.add(e.position() / norm(f.truth.t));
         if (const double square = normalised_error_squared(e.vector, f.covariance); std::isfinite(square))
             nees += square, ++finite;
         if (f.bound.topLeftCorner<3, 3>().trace() > 0) {
-            turn_of_bound.add(e.rotation() / rotation_sigma(f.bound));
-            shift_of_bound.add(e.position() / position_sigma(f.bound));
+            rotation_of_bound.add(e.rotation() / rotation_sigma(f.bound));
+            position_of_bound.add(e.position() / position_sigma(f.bound));
         }
     }
-    s.rotation_rms_rad = turn.rms(), s.position_rms_m = shift.rms(), s.position_rms_of_range = part.rms();
-    s.filtered_rotation_rms_rad = filtered_turn.rms(), s.filtered_position_rms_m = filtered_shift.rms();
-    s.rotation_of_bound = turn_of_bound.rms(), s.position_of_bound = shift_of_bound.rms();
+    s.rotation_rms_rad = rotation.rms(), s.position_rms_m = position.rms(),
+    s.position_rms_of_range = position_of_range.rms();
+    s.filtered_rotation_rms_rad = filtered_rotation.rms(), s.filtered_position_rms_m = filtered_position.rms();
+    s.rotation_of_bound = rotation_of_bound.rms(), s.position_of_bound = position_of_bound.rms();
     if (finite > 0) {
         s.nees_mean = nees / static_cast<double>(finite);
         const double half = 1.96 * std::sqrt(2.0 * kFreedom / static_cast<double>(finite));  // of chi-square

@@ -1,11 +1,11 @@
-#include "emulator/frame_tracker.h"
+#include "tracking/frame_tracker.h"
 
 #include <fmt/format.h>
 
 #include <random>
 
 #include "base/time.h"
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/search/pose_search.h"

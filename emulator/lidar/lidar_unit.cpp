@@ -1,4 +1,4 @@
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 
 #include <algorithm>
 #include <numeric>

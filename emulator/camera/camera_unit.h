@@ -1,4 +1,4 @@
-/// emulator/camera_unit.h - one emulated camera: frame number -> the bytes of the device's format.
+/// emulator/camera/camera_unit.h - one emulated camera: frame number -> the bytes of the device's format.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 #include "emulator/world.h"
 #include "protocols/ledger.h"
 #include "renderer/camera/sensor_array.h"

@@ -1,4 +1,5 @@
-/// emulator/lidar_unit.h - one LiDAR under emulation: packet number -> the bytes that the instrument would send.
+/// emulator/lidar/lidar_unit.h - one LiDAR under emulation: packet number -> the bytes that the instrument would
+/// send.
 #pragma once
 
 #include <cstdint>

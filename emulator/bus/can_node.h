@@ -1,4 +1,4 @@
-/// emulator/can_node.h - narpa on the CAN bus: commands in, heartbeat, frame ledgers and estimates out. One thread
+/// emulator/bus/can_node.h - narpa on the CAN bus: commands in, heartbeat, ledgers and estimates out. One thread
 /// uses it.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 #include "drivers/can/can_bus.h"
 #include "drivers/can/client_hub.h"
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 #include "emulator/log/row_log.h"
 #include "emulator/world.h"
 #include "protocols/can/messages.h"
@@ -65,11 +65,17 @@ public:
     bool receive(std::int64_t t_now_ns, bool& moved) noexcept;
     /// No frame is left on the bus or waits for its time.
     [[nodiscard]] bool ended() const noexcept { return bus_.ended() && !waiting_; }
-    void send(const FrameLedger& ledger, std::int64_t t_now_ns) noexcept;
-    void send(const EstimateReport& estimate, std::int64_t t_now_ns) noexcept;
-    void send(const CameraState& state, std::int64_t t_now_ns) noexcept;
-    /// Sets the report's counter.
-    void send(LidarBeamReport report, std::int64_t t_now_ns) noexcept;
+    /// Sends a message in the form that the bus carries: any with a Codec.
+    template <class Message>
+    void send(const Message& message, std::int64_t t_now_ns) noexcept {
+        for (const CanFrame& frame : encode(message, bus_.carries_fd())) put(frame, t_now_ns);
+    }
+    /// The same with the bus's own counter: +1 with every message of its identifiers, from any sensor.
+    template <class Message>
+    void send_numbered(Message message, std::int64_t t_now_ns) noexcept {
+        message.counter = counter(base_id_of(message))++;
+        send(message, t_now_ns);
+    }
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
     /// Sends the last heartbeat again, for clients that have joined since; not where the bus knows that there are
     /// none. It is not logged: a log in lockstep does not depend on wall time.
@@ -110,7 +116,9 @@ private:
     /// Answers a command or trigger that has an unknown choice.
     void refuse(std::uint8_t counter, std::uint8_t camera, bool to_trigger, std::int64_t t_now_ns) noexcept;
     void sync(std::int64_t t_now_ns) noexcept;
-    void send(const CameraReply& reply, std::int64_t t_now_ns) noexcept;
+    [[nodiscard]] std::uint8_t& counter(std::uint32_t base_id) noexcept {
+        return sent_[base_id / kBaseIdStep % sent_.size()];
+    }
     [[nodiscard]] std::int64_t latest_ns(const PoseTrack& track, std::int64_t t_now_ns) const noexcept;
     void put(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
     void log_frame(const CanFrame& frame, std::int64_t t_ns, std::string_view interface = "narpa") noexcept;
@@ -129,10 +137,10 @@ private:
     MessageDecoder<CameraCommand> camera_commands_;
     MessageDecoder<CameraTrigger> camera_triggers_;
     CommandCounters counters_{};
-    bool many_refused_ = false;  ///< of any body
-    std::uint8_t heartbeat_counter_ = 0, beam_counter_ = 0;
-    CanFrame heartbeat_{};         ///< the last
-    std::int64_t log_second_ = 0;  ///< in which logged_others_ were logged
+    bool many_refused_ = false;                             ///< of any body
+    std::array<std::uint8_t, 0x800 / kBaseIdStep> sent_{};  ///< the next counter of each base identifier
+    CanFrame heartbeat_{};                                  ///< the last
+    std::int64_t log_second_ = 0;                           ///< in which logged_others_ were logged
     std::uint64_t logged_others_ = 0;
     std::uint32_t left_out_ = 0;  ///< since the last line that states it
 };

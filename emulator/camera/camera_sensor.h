@@ -1,4 +1,5 @@
-/// emulator/camera_sensor.h - a camera in the loop: frames from its unit to sinks, logs, ledgers and estimator.
+/// emulator/camera/camera_sensor.h - a camera in the loop: frames from its unit to sinks, logs, ledgers and
+/// estimator.
 #pragma once
 
 #include <array>
@@ -10,13 +11,13 @@
 
 #include "base/spsc_ring.h"
 #include "drivers/video/video_sink.h"
-#include "emulator/camera_control.h"
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_control.h"
+#include "emulator/camera/camera_unit.h"
 #include "emulator/log/contact_sheet.h"
 #include "emulator/log/histogram.h"
 #include "emulator/log/row_log.h"
-#include "emulator/online_estimator.h"
-#include "emulator/sensor.h"
+#include "emulator/sensor_kind.h"
+#include "emulator/sinks.h"
 
 namespace narpa {
 
@@ -42,8 +43,8 @@ public:
 
     /// Keeps each frame's ledger for send_telemetry.
     void keep_ledgers() noexcept { keeps_ledgers_ = true; }
-    /// Gives each frame that is handed over to the estimator too, which must outlive the run.
-    void show_to(OnlineEstimator& estimator) noexcept { estimator_ = &estimator; }
+    /// Gives each frame that is handed over to this feed too, which must outlive the run.
+    void feed(FrameFeed& feed) { feeds_.push_back(&feed); }
 
     [[nodiscard]] std::string_view kind() const noexcept override { return "camera"; }
     [[nodiscard]] std::string_view name() const noexcept override { return unit_.camera().name; }
@@ -68,12 +69,19 @@ public:
     /// measures the time from radiance to hand-over.
     void warm_up() override;
     void make_next(const Clock& clock) override;
+    /// Keeps ledgers.
+    void connect(CanNode& can) override;
     void send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept override;
     [[nodiscard]] std::uint64_t drops() const noexcept override;
+    [[nodiscard]] std::uint64_t made() const noexcept override { return stats_.frames; }
+    [[nodiscard]] std::string failure() const override;
+    [[nodiscard]] std::string advice() const override;
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
     [[nodiscard]] std::string to_text(bool lockstep) const override;
 
+    /// In the scene.
+    [[nodiscard]] std::size_t index() const noexcept { return index_; }
     [[nodiscard]] const CameraUnit& unit() const noexcept { return unit_; }
     /// Null where the scene has no `control`.
     [[nodiscard]] CameraControl* control() noexcept { return control_ ? &*control_ : nullptr; }
@@ -99,6 +107,7 @@ private:
     void log(const FrameLedger& ledger) noexcept;
 
     const World& world_;
+    std::size_t index_;
     CameraUnit unit_;
     std::vector<std::unique_ptr<VideoSink>> sinks_;
     std::optional<CameraControl> control_;
@@ -109,12 +118,15 @@ private:
     SpscRing<CameraState, 64> states_;  ///< of a camera that is operated
     bool keeps_ledgers_ = false;
     std::uint8_t requests_ = 0;  ///< made by readers so far; used by the CAN thread
-    OnlineEstimator* estimator_ = nullptr;
+    std::vector<FrameFeed*> feeds_;
     CameraStats stats_;
 
     std::string folder_;
     std::unique_ptr<RowLog> truth_log_, ledger_log_;
     std::unique_ptr<ContactSheet> sheet_;
 };
+
+/// SensorKind::open.
+Status open_cameras(const World& world, const RunOptions& options, OpenSensors& out);
 
 }  // namespace narpa

@@ -1,5 +1,5 @@
-/// emulator/camera_control.h - a camera that is operated over CAN while it runs: checks commands and triggers as
-/// they come, and decides when the next exposure starts and with which settings.
+/// emulator/camera/camera_control.h - a camera that is operated over CAN while it runs: checks commands and
+/// triggers as they come, and decides when the next exposure starts and with which settings.
 ///
 /// The CAN thread calls `command`, `trigger` and `sync`, the camera's thread the rest. A command that is received
 /// at t acts on the first frame whose exposure, with the new settings, starts at t + latency or later.

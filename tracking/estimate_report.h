@@ -1,11 +1,11 @@
-/// emulator/log/estimate_report.h - how well poses were estimated over many frames: rows, a summary, a picture.
+/// tracking/estimate_report.h - how well poses were estimated over many frames: rows, a summary, a picture.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 
-#include "emulator/frame_tracker.h"
+#include "tracking/frame_tracker.h"
 
 namespace narpa {
 

@@ -1,4 +1,4 @@
-#include "emulator/camera_control.h"
+#include "emulator/camera/camera_control.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,5 @@
-/// emulator/lidar_sensor.h - a LiDAR in the loop: packets from its unit to sinks at the instrument's own rate.
+/// emulator/lidar/lidar_sensor.h - a LiDAR in the loop: packets from its unit to sinks at the instrument's own
+/// rate.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +8,11 @@
 
 #include "base/spsc_ring.h"
 #include "drivers/lidar/packet_sink.h"
-#include "emulator/lidar_unit.h"
+#include "emulator/lidar/lidar_unit.h"
 #include "emulator/log/histogram.h"
 #include "emulator/log/sweep_log.h"
-#include "emulator/sensor.h"
+#include "emulator/sensor_kind.h"
+#include "emulator/sinks.h"
 #include "protocols/lidar_beam.h"
 
 namespace narpa {
@@ -48,6 +50,7 @@ public:
     void make_next(const Clock& clock) override;
     void send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept override;
     [[nodiscard]] std::uint64_t drops() const noexcept override;
+    [[nodiscard]] std::uint64_t made() const noexcept override { return stats_.packets; }
     Status finish() override;
     [[nodiscard]] nlohmann::json report() const override;
     [[nodiscard]] std::string to_text(bool lockstep) const override;
@@ -75,5 +78,8 @@ private:
     SpscRing<LidarBeamReport, 1024> beams_;
     std::uint64_t beams_lost_ = 0;  ///< the CAN thread did not keep up
 };
+
+/// SensorKind::open.
+Status open_lidars(const World& world, const RunOptions& options, OpenSensors& out);
 
 }  // namespace narpa

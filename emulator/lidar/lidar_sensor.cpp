@@ -1,11 +1,55 @@
-#include "emulator/lidar_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 
 namespace narpa {
+namespace {
+
+Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file) {
+    if (!has_bus) return Error{fmt::format("--lidar {}=can needs --can BUS", lidar.name)};
+    const LidarSpec& spec = lidar.model->spec();
+    const double shots_hz =
+        1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
+    if (shots_hz <= LidarSensor::kMaxBeams_hz) return Ok{};
+    return Error{
+        fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
+                    "frames)",
+                    lidar.name, shots_hz, LidarSensor::kMaxBeams_hz),
+        file};
+}
+
+}  // namespace
+
+Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
+    const Scene& scene = world.scene();
+    if (!o.lidar.empty() && scene.lidars.empty()) return Error{"the scene has no LiDAR", scene.file};
+    for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
+        const Lidar& lidar = scene.lidars[i];
+        auto packets = o.lidar;
+        const auto to_can = [&](const auto& output) {
+            return output.second == "can" && output.first == lidar.name;
+        };
+        const bool beams = std::erase_if(packets, to_can) > 0;
+        if (beams)
+            if (auto good = check_beams_on_can(lidar, !o.bus.empty(), scene.file); !good) return good;
+        auto sinks = open_sinks<PacketSink>(packets, i, scene.lidars, "LiDAR", scene.file, [&](const auto& spec) {
+            return open_packet_sink(spec, lidar.model->spec().network, scene.epoch_unix_ns, o.lockstep,
+                                    lidar.model->metadata());
+        });
+        if (!sinks) return sinks.error();
+        if (sinks->empty() && !beams) continue;
+        auto sensor = std::make_unique<LidarSensor>(world, i, *std::move(sinks), o.log_shots);
+        if (beams) sensor->keep_beams();
+        out.lidars.push_back(sensor.get());
+        out.all.push_back(std::move(sensor));
+    }
+    return Ok{};
+}
 
 LidarSensor::LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
                          bool truth)
@@ -79,7 +123,7 @@ void LidarSensor::report_beams() noexcept {
 }
 
 void LidarSensor::send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& /*faults*/) noexcept {
-    for (LidarBeamReport report; beams_.pop(report);) can.send(report, t_ns);
+    for (LidarBeamReport report; beams_.pop(report);) can.send_numbered(report, t_ns);
 }
 
 std::uint64_t LidarSensor::drops() const noexcept {

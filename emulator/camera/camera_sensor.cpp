@@ -1,4 +1,4 @@
-#include "emulator/camera_sensor.h"
+#include "emulator/camera/camera_sensor.h"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,49 @@
 #include <cmath>
 #include <span>
 
-#include "emulator/can_node.h"
+#include "emulator/bus/can_node.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/trajectory.h"
 #include "renderer/camera/read_out.h"
 
 namespace narpa {
+namespace {
+
+/// The settings that readers of the camera's frames may change. Their requests are handled like commands on CAN, so
+/// without a bus there are none.
+std::optional<VideoControls> controls_of(const Camera& c, bool has_bus) {
+    if (!c.control || !has_bus) return std::nullopt;
+    const CameraSettings s = settings_of(c);
+    return VideoControls{c.control->exposure_min_ns,
+                         std::min(c.control->exposure_max_ns, c.period_ns - rows_ns(c) - 1),
+                         s.exposure_ns,
+                         c.control->gain_max_cdb,
+                         s.gain_cdb,
+                         s.auto_exposure};
+}
+
+}  // namespace
+
+Status open_cameras(const World& world, const RunOptions& o, OpenSensors& out) {
+    const Scene& scene = world.scene();
+    if (!o.video.empty() && scene.cameras.empty()) return Error{"the scene has no camera", scene.file};
+    for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+        const Camera& c = scene.cameras[i];
+        auto sinks = open_sinks<VideoSink>(o.video, i, scene.cameras, "camera", scene.file, [&](const auto& spec) {
+            return open_video_sink(spec, {c.width, c.height, c.format, c.period_ns},
+                                   o.lockstep ? WhenFull::wait : WhenFull::drop, controls_of(c, !o.bus.empty()));
+        });
+        if (!sinks) return sinks.error();
+        if (sinks->empty()) continue;
+        auto camera = std::make_unique<CameraSensor>(world, i, *std::move(sinks));
+        out.cameras.push_back(camera.get());
+        out.all.push_back(std::move(camera));
+    }
+    return Ok{};
+}
+
 CameraSensor::CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
-    : world_(world), unit_(world, camera), sinks_(std::move(sinks)) {
+    : world_(world), index_(camera), unit_(world, camera), sinks_(std::move(sinks)) {
     const LatePolicy late = unit_.camera().late;
     if (late == LatePolicy::repeat || late == LatePolicy::blank) spare_.resize(unit_.bytes().size());
     fill_black(unit_.camera().format, spare_);
@@ -89,8 +124,8 @@ void CameraSensor::make_next(const Clock& clock) {
     stats_.send.add(monotonic_ns() - wall_ready);
     account(ledger);
     log(ledger);
-    if (estimator_ && ledger.delivery == Delivery::frame)
-        estimator_->take(ledger, unit_.bytes(), unit_.placement());
+    if (ledger.delivery == Delivery::frame)
+        for (FrameFeed* feed : feeds_) feed->take(ledger, unit_.bytes(), unit_.placement());
     std::optional<double> level;
     if (unit_.settings().auto_exposure) level = mean_level(unit_.format(), unit_.settings().region, unit_.bytes());
     advance(level);
@@ -164,6 +199,11 @@ void CameraSensor::take_requests(CanNode& can, std::int64_t t_ns) noexcept {
             c.exposure_ns = r.exposure_ns, c.gain_cdb = r.gain_cdb, c.auto_exposure = r.auto_exposure;
             can.command(c, t_ns);
         }
+}
+
+void CameraSensor::connect(CanNode& can) {
+    keep_ledgers();
+    if (control_) can.operate(*control_);
 }
 
 void CameraSensor::send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept {

@@ -1,4 +1,4 @@
-#include "emulator/camera_unit.h"
+#include "emulator/camera/camera_unit.h"
 
 #include <cmath>
 

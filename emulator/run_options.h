@@ -1,0 +1,26 @@
+/// emulator/run_options.h - what a run of the emulator is made of, beside its scene.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "emulator/frame_observer.h"
+
+namespace narpa {
+
+struct RunOptions {
+    std::string bus;                                                ///< BUS; empty: no commands
+    std::vector<std::pair<std::string, std::string>> video, lidar;  ///< sensor name and SINK; a name may repeat
+    bool lockstep = false;
+    double duration_s = 0;   ///< of simulation time; 0: until stopped or until a recorded bus ends
+    std::string log_folder;  ///< empty: no log
+    bool log_shots = false;  ///< logs the truth of every LiDAR shot too, at the cost of a second ray for each
+    int threads = 0;         ///< tracing threads; 0: one per core, or one per entry of `cpus`
+    std::vector<int> cpus;   ///< processors that tracing threads are bound to in real time; empty: any
+    std::vector<OpenFrameObserver> observers{};            ///< of names that differ; several may share a camera
+    std::function<void(const std::string&)> on_refusal{};  ///< in lockstep, once, when CanNode::refuses_poses
+};
+
+}  // namespace narpa

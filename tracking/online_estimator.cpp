@@ -1,0 +1,86 @@
+#include "tracking/online_estimator.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "emulator/bus/can_node.h"
+#include "tracking/estimate_report.h"
+
+namespace narpa {
+
+OnlineEstimator::OnlineEstimator(std::unique_ptr<FrameTracker> tracker, const World& world, std::size_t camera,
+                                 bool lockstep)
+    : tracker_(std::move(tracker)),
+      index_(camera),
+      camera_(world.scene().cameras[camera].name),
+      target_(world.scene().bodies[tracker_->target()].name),
+      title_(fmt::format("{}: {} seen by {}, by {}", world.scene().name, target_, camera_,
+                         kCameraMethods[static_cast<std::size_t>(tracker_->options().method)])) {
+    if (!lockstep) single_threaded_.emplace();
+}
+
+std::string OnlineEstimator::description() const {
+    return fmt::format("pose of {} from camera {}", target_, camera_);
+}
+
+Status OnlineEstimator::log_to(const std::string& folder, bool wait_when_full) {
+    stem_ = folder + "/" + camera_ + ".estimate";
+    auto log = RowLog::create(stem_ + ".csv", std::string(kEstimateHeader) + "\n", wait_when_full);
+    if (!log) return log.error();
+    log_ = *std::move(log);
+    return Ok{};
+}
+
+void OnlineEstimator::observe(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at) {
+    TrackedFrame tracked = tracker_->take(ledger, bytes, at);
+    (void)reports_.push(tracked.report(static_cast<std::uint8_t>(index_)));
+    if (log_) log_->append(estimate_row(tracked));
+    if (frames_.size() < kMaxKept) frames_.push_back(std::move(tracked));
+}
+
+void OnlineEstimator::send_telemetry(CanNode& can, std::int64_t t_ns) noexcept {
+    for (EstimateReport report; reports_.pop(report);) can.send(report, t_ns);
+}
+
+Status OnlineEstimator::finish() {
+    if (!log_) return Ok{};
+    if (auto closed = log_->close(); !closed) return closed;
+    return plot_estimates(stem_ + ".png", title_, frames_);
+}
+
+nlohmann::json OnlineEstimator::report(std::uint64_t skipped) const {
+    return {{"camera", camera_},
+            {"target", target_},
+            {"passed_over", skipped},
+            {"summary", to_json(summarise(frames_))}};
+}
+
+std::string OnlineEstimator::to_text(std::uint64_t skipped) const {
+    return fmt::format("  estimate of {} from camera {}: {} frames skipped; {}", target_, camera_, skipped,
+                       narpa::to_text(summarise(frames_)));
+}
+
+OpenFrameObserver estimate_from(const std::string& camera, const TrackerOptions& options,
+                                const OnlineEstimator** made) {
+    return [=](const World& world, std::span<const std::size_t> cameras,
+               bool lockstep) -> Result<std::unique_ptr<FrameObserver>> {
+        if (cameras.empty())
+            return Error{"--estimate needs a camera, expected --video CAMERA=SINK too (SINK may be none)"};
+        const Scene& scene = world.scene();
+        const auto index = camera.empty() ? Result<std::size_t>(cameras.front())
+                                          : sensor_named(scene.cameras, camera, "camera", scene.file);
+        if (!index) return index.error();
+        if (std::ranges::find(cameras, *index) == cameras.end())
+            return Error{fmt::format("--estimate {}: this camera has no sink, expected --video {}=SINK too", camera,
+                                     camera)};
+        auto tracker = FrameTracker::create(world, *index, options);
+        if (!tracker) return tracker.error();
+        auto estimator = std::make_unique<OnlineEstimator>(*std::move(tracker), world, *index, lockstep);
+        if (made) *made = estimator.get();
+        return std::unique_ptr<FrameObserver>(std::move(estimator));
+    };
+}
+
+}  // namespace narpa

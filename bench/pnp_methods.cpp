@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
-#include "estimator/pose/pnp.h"
+#include "estimator/pnp/pnp.h"
 
 namespace narpa {
 namespace {

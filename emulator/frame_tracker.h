@@ -14,10 +14,10 @@
 #include "base/result.h"
 #include "emulator/world.h"
 #include "estimator/filter/pose_filter.h"
-#include "estimator/pose/answer.h"
+#include "estimator/method/camera_method.h"
 #include "estimator/pose/apparent_motion.h"
-#include "estimator/pose/camera_method.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "protocols/estimate.h"
 #include "protocols/ledger.h"
 

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "base/constants.h"
-#include "estimator/pose/median.h"
-#include "estimator/pose/root_information.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/median.h"
+#include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/root_information.h"
 
 namespace narpa {
 namespace {

@@ -16,9 +16,9 @@
 #include "estimator/cloud/beam_association.h"
 #include "estimator/cloud/empty_beams.h"
 #include "estimator/cloud/plane_equations.h"
-#include "estimator/pose/answer.h"
-#include "estimator/pose/leverage.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/leverage.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 
 namespace narpa {
 

@@ -19,8 +19,8 @@
 
 #include "base/result.h"
 #include "estimator/dense/level_view.h"
-#include "estimator/pose/answer.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 
 namespace narpa {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "estimator/dense/level_solver.h"
-#include "estimator/pose/response.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/response.h"
 
 namespace narpa {
 namespace {

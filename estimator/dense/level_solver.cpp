@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/symmetric.h"
 #include "renderer/camera/scene_camera.h"
 
 namespace narpa {

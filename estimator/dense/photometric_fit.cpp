@@ -10,8 +10,8 @@
 #include <numeric>
 #include <vector>
 
-#include "estimator/pose/median.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/median.h"
+#include "estimator/least_squares/symmetric.h"
 
 namespace narpa {
 namespace {

@@ -8,9 +8,9 @@
 #include <array>
 #include <cmath>
 
-#include "estimator/pose/median.h"
-#include "estimator/pose/response.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/median.h"
+#include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/response.h"
 
 namespace narpa {
 namespace {

@@ -11,9 +11,9 @@
 
 #include "estimator/features/feature_matcher.h"
 #include "estimator/features/model_matches.h"
-#include "estimator/pose/answer.h"
-#include "estimator/pose/model_uncertainty.h"
-#include "estimator/pose/pnp_refine.h"
+#include "estimator/pnp/pnp_refine.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "estimator/view/model_view.h"
 
 namespace narpa {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/symmetric.h"
 
 namespace narpa {
 Rigid3 displaced(const Rigid3& T, const Vector6& error) {

@@ -23,8 +23,8 @@
 
 #include "base/pose.h"
 #include "base/result.h"
-#include "estimator/pose/camera_method.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/method/camera_method.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "rehearsal/contact/landing.h"
 #include "rehearsal/contact/port_state.h"
 

@@ -15,7 +15,7 @@ OnlineEstimator::OnlineEstimator(std::unique_ptr<FrameTracker> tracker, const Wo
       index_(static_cast<std::uint8_t>(camera)),
       target_(world.scene().bodies[tracker_->target()].name),
       title_(fmt::format("{}: {} seen by {}, by {}", world.scene().name, target_, camera_.name,
-                         kCameraMethods[static_cast<std::size_t>(tracker_->options().method)])),
+                         tracker_->options().method->name)),
       lockstep_(lockstep),
       bytes_(frame_bytes({camera_.width, camera_.height, camera_.format, camera_.period_ns})),
       at_(world.scene().bodies.size()) {}

@@ -10,78 +10,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <span>
 
 #include "estimator/pose/pose_estimate.h"
 
 namespace narpa {
-
-/// M = L D L' with L of unit diagonal; of M the lower triangle is read.
-class Cholesky6 {
-public:
-    explicit Cholesky6(const Matrix6& M) {
-        double scaled[kSize][kSize];  // L D
-#pragma GCC unroll 6
-        for (int j = 0; j < kSize; ++j) {
-            double d = M(j, j);
-#pragma GCC unroll 6
-            for (int k = 0; k < j; ++k) d -= scaled[j][k] * L_[j][k];
-            positive_ = positive_ && d > 0;
-            // A pivot over its diagonal entry does not depend on the row's unit.
-            smallest_ = std::min(smallest_, d / M(j, j));
-            inverse_d_[j] = 1 / d;
-#pragma GCC unroll 6
-            for (int i = j + 1; i < kSize; ++i) {
-                double l = M(i, j);
-#pragma GCC unroll 6
-                for (int k = 0; k < j; ++k) l -= scaled[i][k] * L_[j][k];
-                scaled[i][j] = l;
-                L_[i][j] = l * inverse_d_[j];
-            }
-        }
-    }
-
-    [[nodiscard]] bool positive_definite() const noexcept {
-        return positive_;
-    }
-    /// The smallest pivot over its diagonal entry, in (0, 1]: near rounding if the matrix is rank-deficient.
-    [[nodiscard]] double smallest_pivot() const noexcept {
-        return smallest_;
-    }
-
-    [[nodiscard]] Vector6 solve(const Vector6& b) const {
-        double x[kSize];
-#pragma GCC unroll 6
-        for (int i = 0; i < kSize; ++i) {
-            x[i] = b[i];
-#pragma GCC unroll 6
-            for (int k = 0; k < i; ++k) x[i] -= L_[i][k] * x[k];
-        }
-        Vector6 out;
-#pragma GCC unroll 6
-        for (int i = kSize - 1; i >= 0; --i) {
-            x[i] *= inverse_d_[i];
-#pragma GCC unroll 6
-            for (int k = i + 1; k < kSize; ++k) x[i] -= L_[k][i] * x[k];
-            out[i] = x[i];
-        }
-        return out;
-    }
-
-    [[nodiscard]] Matrix6 inverse() const {
-        Matrix6 out;
-        for (int j = 0; j < kSize; ++j) out.col(j) = solve(Vector6::Unit(j));
-        return 0.5 * (out + out.transpose());
-    }
-
-private:
-    static constexpr int kSize = 6;
-    double L_[kSize][kSize];
-    double inverse_d_[kSize];
-    double smallest_ = 1;
-    bool positive_ = true;
-};
 
 /// Normal equations of residuals e = measured - predicted with weights W: A = J' W J, g = J' W e, chi2 = e' W e (or
 /// the robust cost). Only the lower triangle of A is read. `rounding`: the part of chi2 due to rounding of the
@@ -101,29 +34,12 @@ struct DampedStep {
     bool solved = false;             ///< false: A + lambda D is not positive definite
 };
 
-/// h = (A + lambda D)^-1 g.
-[[nodiscard]] inline DampedStep damped_step(const NormalEquations& eq, double lambda,
-                                            Damping damping = Damping::diagonal) {
-    Matrix6 M = eq.A;
-    const Vector6 D = damping == Damping::diagonal ? Vector6(eq.A.diagonal()) : Vector6(Vector6::Ones());
-    M.diagonal() += lambda * D;
-    const Cholesky6 factor(M);
-    DampedStep step;
-    if (!factor.positive_definite()) return step;
-    step.h = factor.solve(eq.g);
-    step.predicted_reduction = step.h.dot(lambda * D.cwiseProduct(step.h) + eq.g);
-    step.solved = std::isfinite(step.predicted_reduction);
-    return step;
-}
+/// h = (A + lambda D)^-1 g. The one place where damped normal equations are solved: the loop below and the dense
+/// alignment's (level_solver.h) differ in how a step is accepted.
+[[nodiscard]] DampedStep damped_step(const NormalEquations& eq, double lambda, Damping damping = Damping::diagonal);
 
 /// A^-1. False where A is singular within rounding: some direction is not observable.
-[[nodiscard]] inline bool invert_information(const Matrix6& A, Matrix6& inverse) {
-    constexpr double kSmallestPivot = 1e-12;
-    const Cholesky6 factor(A);
-    if (!factor.positive_definite() || !(factor.smallest_pivot() > kSmallestPivot)) return false;
-    inverse = factor.inverse();
-    return inverse.allFinite();
-}
+[[nodiscard]] bool invert_information(const Matrix6& A, Matrix6& inverse);
 
 inline constexpr std::size_t kLmIterationsMax = 200;
 inline constexpr int kLmPatience = 6;

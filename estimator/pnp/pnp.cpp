@@ -6,9 +6,9 @@
 namespace narpa {
 namespace {
 
-constexpr double kFlatSigma = 3;         // a body thinner than this in the image is treated as flat
-constexpr double kReversibleSigma = 20;  // thicker than this, the reversed pose cannot fit
-constexpr std::size_t kSurePoints = 6;   // with fewer, wrong minima fit within the noise
+constexpr double kFlatSigma = 3;               // a body thinner than this in the image is treated as flat
+constexpr double kReversibleSigma = 20;        // thicker than this, the reversed pose cannot fit
+constexpr std::size_t kPointsUnambiguous = 6;  // with fewer, wrong minima fit within the noise
 
 double typical_sigma_px(const PnpInput& input) {
     if (input.covariance_px2.empty()) return input.sigma_px;
@@ -30,10 +30,6 @@ double depth_in_sigma(const PnpInput& input, std::span<const BodyPoint> points, 
            (spread.rms_m.x * typical_sigma_px(input));
 }
 
-bool is_a_line(const PointExtent& spread) {
-    return !(spread.rms_m.y > 1e-5 * spread.rms_m.x);
-}
-
 bool same_minimum(const PnpFit& a, const PnpFit& b) {
     const Vector6 e = error_between(a.T_camera_body, b.T_camera_body);
     if (e.head<3>().norm() < 1e-9 && e.tail<3>().norm() < 1e-9 * norm(a.T_camera_body.t)) return true;
@@ -46,7 +42,6 @@ PnpSolver::PnpSolver(std::size_t points_max) : points_(points_max), all_(points_
     gathered_.reserve(points_max);
     squared_.resize(points_max);
     flags_.resize(points_max);
-    starts_.reserve(8);
     solution_.inlier.reserve(points_max);
 }
 
@@ -69,7 +64,7 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, bool outliers) {
     points_.assign(input);
     gather();
     const PointExtent spread = extent_of(gathered_);
-    if (is_a_line(spread)) {
+    if (spread.is_a_line()) {
         solution_.status = PnpStatus::degenerate;
         return solution_;
     }
@@ -82,37 +77,13 @@ const PnpSolution& PnpSolver::solve(const PnpInput& input, bool outliers) {
 
 void PnpSolver::solve_all(const PnpInput& input, const PointExtent& spread) {
     const double depth = depth_in_sigma(input, gathered_, spread);
-    const bool few = points_.size() < kSurePoints;
+    const bool few = points_.size() < kPointsUnambiguous;
     const auto fits = [&] { return fits_the_noise(solution_.fit.chi2, solution_.fit.degrees_of_freedom); };
     const InitialPoses starts = orthographic_poses(gathered_, spread, depth < kFlatSigma);
     for (std::size_t i = 0; i < starts.count; ++i) consider(starts.pose[i]);
-    if (few) consider_triples();
-    if (!fits()) {
-        starts_.clear();
-        opencv_poses(gathered_, depth < kFlatSigma, starts_);
-        for (const CentredPose& start : starts_) consider(start);
-    }
+    if (!fits())
+        if (const auto start = sqpnp_pose(gathered_)) consider(*start);
     if (few || depth < kReversibleSigma || !fits()) consider_reversed(spread);
-}
-
-// Four or five points fit several poses within the noise: also tries the poses of triples.
-void PnpSolver::consider_triples() {
-    constexpr std::size_t kTriples = 4, kRefined = 3;
-    std::array<std::pair<double, CentredPose>, 2 * kTriples> tried;
-    std::size_t count = 0;
-    for (std::size_t left_out = 0; left_out < kTriples; ++left_out) {
-        std::array<BodyPoint, 3> triple;
-        for (std::size_t k = 0, i = 0; k < 3; ++i)
-            if (i != left_out) triple[k++] = gathered_[i];
-        const InitialPoses starts = three_point_poses(triple);
-        for (std::size_t i = 0; i < starts.count; ++i)
-            tried[count++] = {points_.truncated_cost(starts.pose[i], std::numeric_limits<double>::infinity()),
-                              starts.pose[i]};
-    }
-    const std::size_t refined = std::min(count, kRefined);
-    std::partial_sort(tried.begin(), tried.begin() + refined, tried.begin() + count,
-                      [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (std::size_t i = 0; i < refined; ++i) consider(tried[i].second);
 }
 
 void PnpSolver::gather() {

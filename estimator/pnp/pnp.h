@@ -1,9 +1,9 @@
 /// estimator/pnp/pnp.h - perspective-n-point: the pose from correspondences, without a guess, optionally with
 /// outliers.
 ///
-/// Initial poses (pnp_start.h) are refined (pnp_refine.h); the least chi2 wins. Where the fit is worse than the
-/// noise allows, or points are few, OpenCV's SQPNP and IPPE supply more initial poses. The second pose of a nearly
-/// flat or distant body is always searched for, and reported where the data cannot exclude it.
+/// An initial pose (pnp_start.h) is refined (pnp_refine.h); one by SQPNP too where the fit is worse than the noise
+/// allows. The second pose of a nearly flat or distant body is always searched for, and reported where the data
+/// cannot exclude it.
 #pragma once
 
 #include <vector>
@@ -53,17 +53,15 @@ private:
     void solve_with_outliers(const PnpInput& input);
     void gather();
     void consider(const CentredPose& start);
-    void consider_triples();
     void consider_reversed(const PointExtent& spread);
     [[nodiscard]] std::size_t mark_inliers(const PnpPoints& points, const Rigid3& T, std::span<std::uint8_t> flags);
-    [[nodiscard]] bool find_consensus(bool orthographic);
+    [[nodiscard]] bool find_consensus();
     void try_hypothesis(const CentredPose& pose);
 
     PnpPoints points_, all_;  // those in use, and with outliers
     std::vector<BodyPoint> gathered_;
     std::vector<double> squared_;
     std::vector<std::uint8_t> flags_;
-    std::vector<CentredPose> starts_;
     PnpFit trial_;
     struct Consensus {
         double cost_of_sample = 0;  // of the best sample, before refinement

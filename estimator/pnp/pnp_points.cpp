@@ -1,5 +1,6 @@
 #include "estimator/pnp/pnp_points.h"
 
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -62,11 +63,14 @@ PnpPoints::PnpPoints(std::size_t points_max) : groups_((points_max + kGroup - 1)
 
 template <class Chosen>
 void PnpPoints::assign_if(const PnpInput& input, const Chosen& chosen) {
+    assert(input.body_m.size() == input.pixels.size());
+    assert(input.covariance_px2.empty() || input.covariance_px2.size() == input.pixels.size());
     size_ = 0;
     rounding_ = 0;
     Vec3 sum{};
     for (std::size_t i = 0; i < input.body_m.size(); ++i)
         if (chosen(i)) sum += input.body_m[i], ++size_;
+    assert(size_ > 0 && size_ <= capacity());
     centroid_ = sum / static_cast<double>(size_);
     with_model(*input.camera, [&](const auto& model) {
         for (std::size_t i = 0, to = 0; i < input.body_m.size(); ++i)
@@ -266,6 +270,7 @@ double PnpPoints::truncated_cost(const CentredPose& pose, double s_max) const {
 }
 
 void PnpPoints::squared_residuals(const CentredPose& pose, std::span<double> out) const {
+    assert(out.size() >= size_);
     const Matrix m(pose);
     for (std::size_t i = 0; i < size_; i += kGroup) {
         std::array<double, kGroup> s;

@@ -7,11 +7,11 @@ namespace narpa {
 namespace {
 
 constexpr double kSampleSquaredResidual = 36;  // a pose of three noisy points misses the others by more than noise
-constexpr double kMissedConsensus = 1e-4;      // probability that no sample was clean
+constexpr double kProbabilityMissed = 1e-4;    // probability that no sample was clean
 constexpr std::size_t kInliersMin = 5;
-constexpr int kHypothesesMax = 2000, kP3pHypothesesMax = 500;
+constexpr int kHypothesesMax = 2000;
 constexpr double kInliersPart = 0.25;  // of all points, at least
-const RobustLoss kPolish{Loss::cauchy, 2};
+const RobustLoss kRobustRefinement{Loss::cauchy, 2};
 
 std::array<std::size_t, 3> draw_three(std::minstd_rand& random, std::size_t n) {
     std::array<std::size_t, 3> drawn{};
@@ -22,20 +22,21 @@ std::array<std::size_t, 3> draw_three(std::minstd_rand& random, std::size_t n) {
     return drawn;
 }
 
-/// Samples of three needed so that, with probability 1 - kMissedConsensus, one has only inliers, for so many of n.
+/// Samples of three needed so that, with probability 1 - kProbabilityMissed, one has only inliers, for so many of
+/// n.
 double samples_needed(std::size_t inliers, std::size_t n) {
     const auto m = static_cast<double>(inliers), all = static_cast<double>(n);
     const double clean = m * (m - 1) * (m - 2) / (all * (all - 1) * (all - 2));
     if (clean >= 1) return 0;
     if (clean <= 0) return std::numeric_limits<double>::infinity();
-    return std::log(kMissedConsensus) / std::log1p(-clean);
+    return std::log(kProbabilityMissed) / std::log1p(-clean);
 }
 
 }  // namespace
 
 void PnpSolver::solve_with_outliers(const PnpInput& input) {
     all_.assign(input);
-    if (!find_consensus(true) && !find_consensus(false)) {
+    if (!find_consensus()) {
         solution_.status = PnpStatus::no_consensus;
         return;
     }
@@ -68,23 +69,16 @@ std::size_t PnpSolver::mark_inliers(const PnpPoints& points, const Rigid3& T, st
     return inliers;
 }
 
-bool PnpSolver::find_consensus(bool orthographic) {
+bool PnpSolver::find_consensus() {
     const std::size_t n = all_.size();
-    const int tries = orthographic ? kHypothesesMax : kP3pHypothesesMax;
     std::minstd_rand random(1);
     consensus_ = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), {}, 0};
-    for (int tried = 0; tried < tries && tried < samples_needed(consensus_.inliers, n); ++tried) {
+    for (int tried = 0; tried < kHypothesesMax && tried < samples_needed(consensus_.inliers, n); ++tried) {
         std::array<BodyPoint, 3> sample;
         const auto drawn = draw_three(random, n);
         for (std::size_t k = 0; k < 3; ++k) sample[k] = {all_.centred_body_m(drawn[k]), all_.normalised(drawn[k])};
-        if (orthographic) {
-            const InitialPoses starts = three_point_poses(sample);
-            for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i]);
-        } else {
-            starts_.clear();
-            opencv_p3p(sample, starts_);
-            for (const CentredPose& start : starts_) try_hypothesis(start);
-        }
+        const InitialPoses starts = three_point_poses(sample);
+        for (std::size_t i = 0; i < starts.count; ++i) try_hypothesis(starts.pose[i]);
     }
     const auto enough = static_cast<std::size_t>(kInliersPart * static_cast<double>(n));
     return consensus_.inliers >= std::max(kInliersMin, enough);
@@ -95,7 +89,7 @@ void PnpSolver::try_hypothesis(const CentredPose& pose) {
     if (!(cost_of_sample < consensus_.cost_of_sample)) return;
     consensus_.cost_of_sample = cost_of_sample;
     // Local optimisation (Chum, Matas and Kittler 2003): refines the best samples with all points that agree.
-    refine(all_, all_.uncentred(pose), {{}, kPolish}, trial_);
+    refine(all_, all_.uncentred(pose), {{}, kRobustRefinement}, trial_);
     if (trial_.status != PnpStatus::converged) return;
     const double cost = all_.truncated_cost(all_.centred(trial_.T_camera_body), kInlierSquaredResidual);
     if (!(cost < consensus_.cost)) return;

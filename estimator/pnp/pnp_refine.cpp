@@ -1,6 +1,7 @@
 #include "estimator/pnp/pnp_refine.h"
 
 #include <Eigen/LU>
+#include <cassert>
 
 #include "estimator/pnp/pnp_points.h"
 
@@ -28,6 +29,7 @@ bool is_usable(const Rigid3& T) {
 }
 
 void refine(const PnpPoints& points, const Rigid3& start, const RefineOptions& options, PnpFit& fit) {
+    assert(points.size() >= 3);
     fit.T_camera_body = start;
     fit.covariance.setZero();
     fit.chi2 = 0;

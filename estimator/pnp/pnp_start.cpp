@@ -4,14 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
+#include <vector>
 
 namespace narpa {
 namespace {
 
 constexpr int kPerspectiveSteps = 6;
 constexpr double kSettled = 1e-3;  // of the depth: the refinement does the rest
-constexpr double kAstray = 0.1;    // of the depth in the last step: diverges, as perspective is too strong
-constexpr double kLine = 1e-5;     // points narrower than this part of their length lie on a line
+constexpr double kDiverged = 0.1;  // of the depth in the last step: diverges, as perspective is too strong
 
 /// Scaled orthography of flat points: A / s is the upper left block of a rotation, whose singular values are 1 and
 /// |cos of the tilt|. `sign` chooses which side is nearer.
@@ -76,7 +76,7 @@ bool posit(std::span<const BodyPoint> points, const PointExtent& spread, bool fl
         r3_over_z = r3 * rows.scale;
         if (moved < kSettled) break;
     }
-    if (!(moved < kAstray)) return false;
+    if (!(moved < kDiverged)) return false;
     const auto to_body = [&](const Vec3& r) {
         return r.x * spread.axis[0] + r.y * spread.axis[1] + r.z * spread.axis[2];
     };
@@ -102,7 +102,7 @@ PointExtent extent_of(std::span<const BodyPoint> points) {
 
 InitialPoses orthographic_poses(std::span<const BodyPoint> points, const PointExtent& spread, bool flat) {
     InitialPoses starts;
-    if (!(spread.rms_m.y > kLine * spread.rms_m.x)) return starts;
+    if (spread.is_a_line()) return starts;
     for (const double sign : {1.0, -1.0}) {
         if (posit(points, spread, flat, sign, starts.pose[starts.count])) ++starts.count;
         if (!flat) break;
@@ -125,51 +125,23 @@ CentredPose depth_reversed(const CentredPose& pose, const PointExtent& spread) {
             pose.centroid_m};
 }
 
-namespace {
-
-/// Appends the poses that `solve(body_m, seen, rotations, translations)` finds by OpenCV; none where OpenCV throws,
-/// because the method cannot take the points.
-template <class Solve>
-void append_poses(std::span<const BodyPoint> points, const Solve& solve, std::vector<CentredPose>& out) {
+std::optional<CentredPose> sqpnp_pose(std::span<const BodyPoint> points) {
     std::vector<cv::Point3d> body_m;
     std::vector<cv::Point2d> seen;
     for (const BodyPoint& p : points) {
         body_m.emplace_back(p.body_m.x, p.body_m.y, p.body_m.z);
         seen.emplace_back(p.seen.u, p.seen.v);
     }
-    std::vector<cv::Mat> rotations, translations;
+    cv::Vec3d r, t;
+    const cv::Matx33d plane_z_1 = cv::Matx33d::eye();
     try {
-        solve(body_m, seen, rotations, translations);
-    } catch (const cv::Exception&) {
-        return;
+        if (!cv::solvePnP(body_m, seen, plane_z_1, cv::noArray(), r, t, false, cv::SOLVEPNP_SQPNP)) return {};
+    } catch (const cv::Exception&) {  // it cannot take the points
+        return {};
     }
-    for (std::size_t i = 0; i < rotations.size(); ++i) {
-        const auto r = rotations[i].ptr<double>(), t = translations[i].ptr<double>();
-        const CentredPose pose{exp_rotation({r[0], r[1], r[2]}), {t[0], t[1], t[2]}};
-        if (std::isfinite(norm(pose.q)) && is_finite(pose.centroid_m)) out.push_back(pose);
-    }
-}
-
-/// Intrinsics of the plane z = 1.
-const cv::Matx33d kUnitCamera = cv::Matx33d::eye();
-
-}  // namespace
-
-void opencv_poses(std::span<const BodyPoint> points, bool flat, std::vector<CentredPose>& out) {
-    for (const auto method : {cv::SOLVEPNP_SQPNP, cv::SOLVEPNP_IPPE}) {
-        if (method == cv::SOLVEPNP_IPPE && !flat) break;
-        const auto solve = [&](const auto& body_m, const auto& seen, auto& rotations, auto& translations) {
-            cv::solvePnPGeneric(body_m, seen, kUnitCamera, cv::noArray(), rotations, translations, false, method);
-        };
-        append_poses(points, solve, out);
-    }
-}
-
-void opencv_p3p(const std::array<BodyPoint, 3>& points, std::vector<CentredPose>& out) {
-    const auto solve = [](const auto& body_m, const auto& seen, auto& rotations, auto& translations) {
-        cv::solveP3P(body_m, seen, kUnitCamera, cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
-    };
-    append_poses(points, solve, out);
+    const CentredPose pose{exp_rotation({r[0], r[1], r[2]}), {t[0], t[1], t[2]}};
+    if (!std::isfinite(norm(pose.q)) || !is_finite(pose.centroid_m)) return {};
+    return pose;
 }
 
 }  // namespace narpa

@@ -98,25 +98,30 @@ TEST_F(PnpReference, BoundRefusesWhatHasNone) {
     EXPECT_FALSE(pnp_bound({seen.camera, {seen.body_m.data(), 2}, {seen.pixels.data(), 2}}, truth));
 }
 
-TEST(Cholesky6, SolvesAndInverts) {
+TEST(NormalEquations, AreSolvedAndInverted) {
     std::mt19937_64 random(2);
     std::normal_distribution<double> n;
+    Matrix6 inverse;
     for (int trial = 0; trial < 100; ++trial) {
         Matrix6 G;
         Vector6 b;
         for (int i = 0; i < 36; ++i) G(i / 6, i % 6) = n(random);
         for (int i = 0; i < 6; ++i) b[i] = n(random);
         const Matrix6 M = G * G.transpose() + 0.01 * Matrix6::Identity();
-        const Cholesky6 factor(M);
-        ASSERT_TRUE(factor.positive_definite());
-        EXPECT_LT((M * factor.solve(b) - b).norm(), 1e-10 * b.norm());
-        EXPECT_LT((M * factor.inverse() - Matrix6::Identity()).norm(), 1e-9);
-        EXPECT_FALSE(Cholesky6(Matrix6(M - 1000 * Matrix6::Identity())).positive_definite());
+        const DampedStep step = damped_step({M, b}, 0);
+        ASSERT_TRUE(step.solved);
+        EXPECT_LT((M * step.h - b).norm(), 1e-10 * b.norm());
+        ASSERT_TRUE(invert_information(M, inverse));
+        EXPECT_LT((M * inverse - Matrix6::Identity()).norm(), 1e-9);
+        EXPECT_FALSE(damped_step({Matrix6(M - 1000 * Matrix6::Identity()), b}, 0).solved);
     }
+    // The smallest pivot over its diagonal entry is twice the deviation from 1.
     Matrix6 poor = Matrix6::Identity();
     poor(1, 0) = poor(0, 1) = 1 - 1e-9;
-    EXPECT_NEAR(Cholesky6(poor).smallest_pivot(), 2e-9, 1e-12);
-    EXPECT_FALSE(Cholesky6(Matrix6(Matrix6::Constant(std::nan("")))).positive_definite());
+    EXPECT_TRUE(invert_information(poor, inverse));
+    poor(1, 0) = poor(0, 1) = 1 - 1e-13;
+    EXPECT_FALSE(invert_information(poor, inverse));
+    EXPECT_FALSE(invert_information(Matrix6::Constant(std::nan("")), inverse));
 }
 
 }  // namespace

@@ -230,7 +230,7 @@ TEST_F(SolvePnp, DangerCylinderIsFlagged) {
     EXPECT_FALSE(solver_.solve(near.input()).imprecise);
 }
 
-TEST_F(SolvePnp, TouchesNoHeapWhereItsOwnStartsServe) {
+TEST_F(SolvePnp, AllocatesNothingUnlessOpenCvIsUsed) {
     if (!test::kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer brings its own heap";
     const test::Seen seen = test::see(random_, test::random_points(random_, 30, 2), some_pose(20), 0.5);
     test::Seen spoilt = seen;
@@ -241,7 +241,7 @@ TEST_F(SolvePnp, TouchesNoHeapWhereItsOwnStartsServe) {
     EXPECT_EQ(counter.on_this_thread(), 0u);
 }
 
-TEST_F(SolvePnp, RefusesWhatHasNoPose) {
+TEST_F(SolvePnp, RefusesDegenerateOrInvalidInput) {
     const Rigid3 truth = some_pose(10);
     const auto status = [&](const std::vector<Vec3>& points, const auto& spoil, bool outliers) {
         test::Seen seen = test::see(random_, points, truth, 0.3);

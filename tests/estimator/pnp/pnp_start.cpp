@@ -110,30 +110,18 @@ TEST_F(PnpStart, TriplesNeedNotBeCentred) {
     EXPECT_GE(near, 90);  // the rest: triples nearly on a line, or on edge
 }
 
-TEST_F(PnpStart, OpenCvsStartsAreExactOnExactPixels) {
+TEST_F(PnpStart, SqpnpIsExactOnExactPixels) {
     for (int trial = 0; trial < 50; ++trial) {
         const Rigid3 truth{test::random_attitude(random_), {0.1, -0.1, 6}};
-        std::vector<Vec3> body = test::random_points(random_, 8, 1);
-        const bool flat = trial % 2 == 1 && std::abs((truth.q * Vec3{0, 0, 1}).z) > 0.2;
-        if (flat)
-            for (Vec3& p : body) p.z = 0;
-        const Gathered g(test::see(random_, body, truth, 0));
-        const auto nearest = [&](const std::vector<CentredPose>& starts) {
-            double best = M_PI;
-            for (const CentredPose& start : starts)
-                best = std::min(best, error_between(g.points.uncentred(start), truth).norm());
-            return best;
-        };
-        std::vector<CentredPose> starts, of_three;
-        opencv_poses(g.list, flat, starts);
-        ASSERT_GE(starts.size(), flat ? 3u : 1u);
-        EXPECT_LT(nearest(starts), 1e-4);
-        opencv_p3p({g.list[0], g.list[1], g.list[2]}, of_three);
-        EXPECT_LT(nearest(of_three), 1e-4);
+        const Gathered g(test::see(random_, test::random_points(random_, 8, 1), truth, 0));
+        const auto start = sqpnp_pose(g.list);
+        ASSERT_TRUE(start);
+        EXPECT_LT(error_between(g.points.uncentred(*start), truth).norm(), 1e-4);
     }
+    EXPECT_FALSE(sqpnp_pose({})) << "of no points";
 }
 
-TEST_F(PnpStart, LinesAndCoincidingPointsGiveNone) {
+TEST_F(PnpStart, CollinearOrCoincidingPointsGiveNoPose) {
     const Rigid3 truth{test::random_attitude(random_), {0, 0, 10}};
     std::vector<Vec3> line;
     for (int i = 0; i < 6; ++i) line.push_back(Vec3{1, 2, 3} * (0.1 * i));

@@ -25,7 +25,7 @@ struct FeatureSettings {
     int spp = 4;               ///< of the views
     int spp_over_time = 16;    ///< the same if rows are exposed over time: each sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
-    double floor_most_px = 1;  ///< refused if matches scatter by more: the frame does not show the model
+    double floor_max_px = 1;   ///< refused if matches scatter by more: the frame does not show the model
     ModelUncertainty model{};  ///< albedo is not used, as views are scaled to the frame's light
 };
 

@@ -1,6 +1,7 @@
 #include "estimator/uncertainty/answer.h"
 
 #include <fmt/format.h>
+#include <cassert>
 
 #include <algorithm>
 #include <array>
@@ -45,6 +46,7 @@ std::string to_text(const Observability& o) {
 }  // namespace
 
 Answer judge(Fit fit) {
+    assert(fit.observability.unobserved >= 0 && fit.observability.unobserved <= 6);
     Answer answer;
     answer.observability = fit.observability;
     answer.root_information = fit.root_information;
@@ -75,6 +77,7 @@ Answer judge(Fit fit) {
 }
 
 Observability observability_of(const Matrix6& covariance, double range_m) {
+    assert(range_m >= 0);
     const Vector6 most = limits(range_m);
     const Matrix6 scaled = most.cwiseInverse().asDiagonal() * covariance * most.cwiseInverse().asDiagonal();
     // Eigenvalues are ascending: the least information first is the largest variance first.

@@ -1,5 +1,6 @@
 #include "estimator/uncertainty/leverage.h"
 
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 
@@ -32,6 +33,7 @@ Leverage largest(const CheckedInformation& in, std::span<const WeightedRow> rows
 }  // namespace
 
 CheckedInformation checked_information(std::span<WeightedRow> rows, const PointSpread& spread, double threshold) {
+    assert(std::isfinite(threshold) && threshold >= 0);
     CheckedInformation in;
     const auto add = [&](const WeightedRow& row, double sign) {
         const Matrix6 of_row = sign * row.derivative * row.derivative.transpose();

@@ -1,6 +1,7 @@
 #include "estimator/uncertainty/model_uncertainty.h"
 
 #include <Eigen/Geometry>
+#include <cassert>
 
 namespace narpa {
 
@@ -29,6 +30,7 @@ PoseShifts image_shifts(const ModelUncertainty& u, const Rigid3& T, const Appare
 }
 
 PoseShifts joined(const PoseShifts& a, const PoseShifts& b) {
+    assert(a.cols() + b.cols() <= PoseShifts::MaxColsAtCompileTime);
     PoseShifts all(6, a.cols() + b.cols());
     all << a, b;
     return all;

@@ -1,5 +1,7 @@
 #include "estimator/uncertainty/observability.h"
 
+#include <cassert>
+
 #include "estimator/least_squares/symmetric.h"
 
 namespace narpa {
@@ -25,6 +27,7 @@ Vector6 Observability::solve(const Matrix6& hessian, const Vector6& gradient) co
 }
 
 Matrix6 Observability::along_motions(const Matrix6& information) const {
+    assert(unobserved >= 0 && unobserved <= 6);
     Matrix6 within = motions.transpose() * information * motions;
     within.topRows(unobserved).setZero();
     within.leftCols(unobserved).setZero();
@@ -49,6 +52,7 @@ Matrix6 Observability::root_information(const Matrix6& information, double facto
 }
 
 Observability observability(const Matrix6& hessian, const PointSpread& spread, double threshold) {
+    assert(spread.radius_m > 0 && spread.weight > 0);
     const Matrix6 S = from_normalised(spread);
     const Matrix6 normalised = S.transpose() * hessian * S / spread.weight;
     const SymmetricEigen eigen = symmetric_eigen(0.5 * (normalised + normalised.transpose()));

@@ -14,7 +14,7 @@
 namespace narpa {
 
 /// Lower limit of the response to a motion: so small that its variance exceeds all limits.
-inline constexpr double kMinShown = 1e-4;
+inline constexpr double kResponseMin = 1e-4;
 
 /// Number of motions whose response is measured: the least observed ones, along which the changes of the
 /// measurements cancel, so that errors of the Jacobian matter. The response to the others is taken as one.
@@ -34,10 +34,10 @@ template <class Shown>
     return response;
 }
 
-/// R^-1 C R^-T. Responses are limited to kMinShown .. max_shown: with 1, C is never reduced. Nor is it reduced
-/// if some response is below one half, as the Jacobian then is wrong for other motions too. `response`: R, for
-/// errors of pose_estimate.h.
+/// R^-1 C R^-T. Responses are limited to kResponseMin .. response_max: with 1, C is never reduced. Nor is it
+/// reduced if some response is below one half, as the Jacobian then is wrong for other motions too. `response`: R,
+/// for errors of pose_estimate.h.
 [[nodiscard]] Matrix6 covariance_by_response(const Matrix6& covariance, const Matrix6& response,
-                                             double max_shown = 1);
+                                             double response_max = 1);
 
 }  // namespace narpa

@@ -82,7 +82,7 @@ double nees(const CloudEstimate& e) {
 }
 
 /// All points lie on the model, which goes on where the target ends.
-TEST(EmptyBeams, AModelWithWhatTheTargetLacksIsRefused) {
+TEST(EmptyBeams, AModelWithExtraSurfacesIsRefused) {
     std::mt19937_64 random(1);
     const Target target(tug(0, {})), model(tug(2, test::lambert(0.3F)));
     const LidarSweep sweep = look_at(target, random);
@@ -96,7 +96,7 @@ TEST(EmptyBeams, AModelWithWhatTheTargetLacksIsRefused) {
     EXPECT_LT(seeing.empty_beams.chance, 1e-20);
 }
 
-TEST(EmptyBeams, PosesThatAreRightAreNotRefused) {
+TEST(EmptyBeams, CorrectPosesAreNotRefused) {
     std::mt19937_64 random(2);
     const Target target(tug(2, test::lambert(0.3F)));
     for (const double lost : {0.0, 0.02, 0.3, 0.8}) {
@@ -109,7 +109,7 @@ TEST(EmptyBeams, PosesThatAreRightAreNotRefused) {
 }
 
 /// A mirror sends nothing back, and a black end too little for this LiDAR; the model says so.
-TEST(EmptyBeams, SurfacesThatNeedNotReturnRefuseNothing) {
+TEST(EmptyBeams, SurfacesWithUncertainReturnRefuseNothing) {
     std::mt19937_64 random(3);
     Material mirror;
     mirror.kind = Material::Kind::mirror;
@@ -127,7 +127,7 @@ TEST(EmptyBeams, SurfacesThatNeedNotReturnRefuseNothing) {
 }
 
 /// Where the pose is not held, its outline is not either.
-TEST(EmptyBeams, BeamsNextToAnUncertainOutlineSayNothing) {
+TEST(EmptyBeams, BeamsBesideAnUncertainOutlineAreNotCounted) {
     std::mt19937_64 random(4);
     const Target target(tug(0, {})), model(tug(2, test::lambert(0.3F)));
     const LidarSweep sweep = look_at(target, random);
@@ -139,7 +139,7 @@ TEST(EmptyBeams, BeamsNextToAnUncertainOutlineSayNothing) {
     EXPECT_EQ(beams.count({kPose.q, -kPose.t}, sure).empty, 0u) << "behind the LiDAR";
 }
 
-TEST(EmptyBeams, TheChanceIsThatOfAllOrders) {
+TEST(EmptyBeams, ProbabilityIsThatOfEnumeratedOrders) {
     for (const unsigned n : {1u, 3u, 8u, 14u})
         for (unsigned empty = 0; empty <= n; ++empty) {
             std::vector<double> orders(n + 2);
@@ -176,7 +176,7 @@ TEST(EmptyBeams, AllocateNothingAfterTheFirstSweep) {
     EXPECT_EQ(first->empty_beams.chance, again->empty_beams.chance);
 }
 
-TEST(EmptyBeams, BadOnesAreReported) {
+TEST(EmptyBeams, InvalidBeamsAreReported) {
     std::mt19937_64 random(6);
     const Target target(tug(0, {}));
     LidarSweep sweep = look_at(target, random);

@@ -143,7 +143,7 @@ TEST(IcpShapes, UnobservableMotionsAreReported) {
 
 /// With standard deviations of 0.1 mm beside motions of which nothing is known, a covariance cannot be told in
 /// double precision; the filter takes the root of the information, and keeps what it knew of the other motions.
-TEST(IcpShapes, TheFilterTakesWhatIsObservedAndKeepsTheRest) {
+TEST(IcpShapes, TheFilterUpdatesObservedMotionsOnly) {
     for (const SweptShape& shape : kShapes) {
         SCOPED_TRACE(shape.name);
         const auto e = align(shape, 1e-4);
@@ -209,7 +209,7 @@ TEST(IcpShapes, EigenvaluesOfACubeAreKnown) {
     }
 }
 
-TEST(IcpShapes, NothingDriftsAlongThem) {
+TEST(IcpShapes, PosesDoNotDriftAlongUnobservedMotions) {
     for (const SweptShape& shape : kShapes) {
         SCOPED_TRACE(shape.name);
         Scene scene;

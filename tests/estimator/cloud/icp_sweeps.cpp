@@ -297,7 +297,7 @@ TEST(IcpSweeps, PointsWithEdgesInTheirBeamsAreLeftOut) {
 
 /// Sweeps at which faces stopped short of their edges, or another pose explained nine in ten points: of 5000 such
 /// sweeps, those whose answers were credible and beyond 7 standard deviations of their covariance.
-TEST(IcpSweeps, NoAnswerIsWrongAndCredible) {
+TEST(IcpSweeps, GoodAnswersAreWithinTheirCovariance) {
     struct Group {
         std::vector<std::uint64_t> seeds;
         double nearest_m, farthest_m;

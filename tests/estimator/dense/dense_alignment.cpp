@@ -78,7 +78,7 @@ TEST_F(DockingFrame, IsFoundFromFiveDegreesAndFivePerCent) {
     EXPECT_LT(error.tail<3>().norm(), 1e-3 * norm(truth.t));
 }
 
-TEST_F(DockingFrame, DoesNotSettleOnAFalseMinimumInSilence) {
+TEST_F(DockingFrame, RefusesFalseMinima) {
     const MeasuredImage frame = frame_at(truth, true);
     DenseAlignment dense(*render_scene, camera, 0);
     DenseOptions o;
@@ -112,7 +112,7 @@ TEST_F(DockingFrame, IsTheSameOnAnyNumberOfThreads) {
     EXPECT_EQ(one.covariance, three.covariance);
 }
 
-TEST_F(DockingFrame, RefusesWhatCannotBeUsed) {
+TEST_F(DockingFrame, RefusesInvalidInput) {
     const MeasuredImage frame = frame_at(truth, false);
     DenseAlignment dense(*render_scene, camera, 0);
     const auto says = [&](const MeasuredImage& f, const Rigid3& guess, const DenseOptions& o,
@@ -200,7 +200,7 @@ TEST_F(DockingFrame, VarianceAllowsForMissedLight) {
 }
 
 /// Where the target covers more than 10,000 pixels, those that hold the pose make the last steps.
-TEST_F(DockingFrame, OfManyPixelsIsFoundByThoseThatHoldThePose) {
+TEST_F(DockingFrame, OfManyPixelsIsFoundByInformativePixels) {
     camera = scene.cameras[0];
     camera.format = PixelFormat::y16;
     at.T_world_body[1].t = {15, 0.7, -0.5};

@@ -69,7 +69,7 @@ struct Disc {
     }
 };
 
-TEST(InformativePixels, AreTheFewestThatHoldThatPart) {
+TEST(InformativePixels, AreTheFewestWithThatPartOfTheInformation) {
     Disc disc;
     std::mt19937_64 random(5);
     (void)disc.score(0.4, random);  // a frame

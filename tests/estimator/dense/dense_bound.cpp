@@ -87,7 +87,7 @@ TEST(PhotometricFit, EliminatesTheExposureAsTheWholeInverseDoes) {
 }
 
 /// Also where the noise is three times what the sensor is said to have.
-TEST(PhotometricFit, ItsCovarianceIsThatOfItsErrors) {
+TEST(PhotometricFit, CovarianceIsThatOfErrors) {
     for (const double times : {1.0, 3.0}) {
         std::mt19937_64 random(5);
         LinearModel model(random);
@@ -117,7 +117,7 @@ TEST(PhotometricFit, FindsTheShift) {
 }
 
 /// A shiny ellipsoid, 84 pixels long, through the detector's noise.
-TEST(DenseBound, ErrorsAreThoseThatNoiseMakes) {
+TEST(DenseBound, ErrorsOfNoiseReachTheBound) {
     Scene scene;
     scene.sun = Sun{normalized(Vec3{0.6, -0.3, -0.7}), 1361, 0};
     scene.ambient = {20, 20, 20};

@@ -245,7 +245,7 @@ TEST(ImageDerivative, OfTheDockingScene) {
 }
 
 /// Pixels that are not chosen are left out; the others do not depend on it.
-TEST(ImageDerivative, LooksAtTheChosenPixels) {
+TEST(ImageDerivative, IsOfTheChosenPixelsOnly) {
     const auto scene = read_scene(test::build_path("scenes/docking/docking.toml"));
     ASSERT_TRUE(scene) << scene.error().text();
     const auto render_scene = RenderScene::create(*scene);

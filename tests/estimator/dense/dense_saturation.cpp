@@ -70,7 +70,7 @@ TEST(DenseSaturation, ACubeIsFoundByItsOutline) {
     EXPECT_LT(c.worst_part, 1e-3);
 }
 
-TEST(DenseSaturation, WhatClaimsToBeRightOnTheStationIsRight) {
+TEST(DenseSaturation, GoodAnswersOnTheStationAreWithinTheirCovariance) {
     auto station = read_scene(test::build_path("scenes/docking/docking.toml"));
     ASSERT_TRUE(station) << station.error().text();
     const Claims c = claims(*station, test::square_camera(128), 30, 30, 6);

@@ -123,7 +123,7 @@ TEST_F(FeatureAlignmentTest, IsAsGoodWhereTheFrameIsDarkerOrBrighterThanTheModel
     for (const double light : {0.6, 1.3}) EXPECT_LT(error_with(light), 2 * exact) << light;
 }
 
-TEST_F(FeatureAlignmentTest, TheSameFromTheSame) {
+TEST_F(FeatureAlignmentTest, IsDeterministic) {
     const MeasuredImage frame = frame_at(20, 1);
     std::mt19937_64 random(4);
     const Rigid3 guess = off_by(3, random);

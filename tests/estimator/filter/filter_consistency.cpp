@@ -53,7 +53,7 @@ TEST(FilterConsistency, ErrorsAgreeWithTheCovariance) {
 }
 
 /// The pose that comes out has the convention of those that went in.
-TEST(FilterConsistency, PosesComeOutAsTheyWentIn) {
+TEST(FilterConsistency, PoseOfTheFirstMeasurementIsReturned) {
     const Case c = cases()[2];
     Flight r(c, 3);
     const PoseMeasurement m = r.measure(0);

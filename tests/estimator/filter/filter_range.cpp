@@ -44,7 +44,7 @@ TEST(FilterRange, CorrectsEachComponentThatTheRangeDependsOn) {
     EXPECT_GT(corrected, 150);
 }
 
-TEST(FilterRange, RefusesWhatIsNoBeam) {
+TEST(FilterRange, RefusesInvalidBeams) {
     auto filter = *PoseFilter::create({}, 0, {}, Matrix12::Identity());
     BeamRange m{.direction = {0, 0, 1}, .point_m = {0, 0, 5}, .normal = {0, 0, -1}, .range_m = 5, .sigma_m = 0.1};
     EXPECT_EQ(filter.update(m).outcome, UpdateOutcome::taken);

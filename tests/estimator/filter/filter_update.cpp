@@ -30,7 +30,7 @@ Ended in_order(const Case& c, const std::vector<PoseMeasurement>& measurements, 
     return {filter.state(), filter.covariance(), filter.counts()};
 }
 
-TEST(FilterHistory, LateMeasurementsAreWorthAsMuch) {
+TEST(FilterHistory, LateMeasurementsGiveTheSameEstimate) {
     for (const Case& c : {cases()[3], cases()[5]}) {
         SCOPED_TRACE(c.name);
         Flight r(c, 21);
@@ -56,7 +56,7 @@ TEST(FilterHistory, LateMeasurementsAreWorthAsMuch) {
 }
 
 /// Thrust that becomes known after measurements of a later time, and once after a thrust that it replaces.
-TEST(FilterHistory, LateThrustIsWorthAsMuch) {
+TEST(FilterHistory, LateThrustGivesTheSameEstimate) {
     const Case c = cases()[3];
     Flight r(c, 22);
     const RelativeState guess = r.first_guess();
@@ -81,7 +81,7 @@ TEST(FilterHistory, LateThrustIsWorthAsMuch) {
     EXPECT_LT(normalised_error_squared(apart, punctual.covariance()), 1e-12) << apart.transpose();
 }
 
-TEST(FilterHistory, WhatIsOlderThanItIsCounted) {
+TEST(FilterHistory, OlderMeasurementsAreCounted) {
     const Case c = cases()[1];
     Flight r(c, 5);
     FilterSettings settings{c.motion};
@@ -143,7 +143,7 @@ TEST(FilterUpdate, TheGateHasItsProbability) {
     EXPECT_NEAR(static_cast<double>(gated), 50, 4 * std::sqrt(50.0));
 }
 
-TEST(FilterUpdate, RefusesWhatIsNoMeasurement) {
+TEST(FilterUpdate, RefusesInvalidMeasurements) {
     constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
     const Case c = cases()[1];
     Flight r(c, 7);
@@ -189,7 +189,7 @@ TEST(FilterUpdate, RefusesWhatIsNoMeasurement) {
     EXPECT_FALSE(PoseFilter::create(settings, 0, before, r.first_covariance()));
 }
 
-TEST(FilterUpdate, ThrustIsAsUnsureAsItIsSaidToBe) {
+TEST(FilterUpdate, ThrustNoiseAddsToTheCovariance) {
     const Case c = cases()[1];
     Flight r(c, 10);
     const Matrix12 P = r.first_covariance();

@@ -43,7 +43,7 @@ BeamVelocity beam_between(const Encounter& s, const Vec3& on_chaser, const Vec3&
     return m;
 }
 
-TEST(FilterVelocity, IsWhatTwoRigidBodiesDo) {
+TEST(FilterVelocity, IsThatOfTwoRigidBodies) {
     std::mt19937_64 random(5);
     for (int k = 0; k < 200; ++k) {
         const auto vector = [&](double size) {
@@ -112,7 +112,7 @@ TEST(FilterVelocity, ErrorsAgreeWithTheCovarianceAndAreSmaller) {
     }
 }
 
-TEST(FilterVelocity, RefusesWhatCannotBe) {
+TEST(FilterVelocity, RefusesInvalidVelocities) {
     Flight r(cases()[0], 1);
     auto filter = *PoseFilter::create({}, 0, r.first_guess(), r.first_covariance());
     const BeamVelocity good{.direction = {1, 0, 0}, .point_m = {20, 0, 0}, .sigma_m_s = 1};

@@ -48,12 +48,6 @@ TEST(PoseError, LeadsFromOnePoseToTheOther) {
     EXPECT_LT(error_between(kPose, kPose).norm(), 1e-15);
 }
 
-TEST(PoseError, CovarianceFollowsTheInverse) {
-    const Matrix6 J = numeric_jacobian([](const Rigid3& T) { return inverse(T); });
-    const Matrix6 C = some_covariance(), expected = J * C * J.transpose();
-    EXPECT_LT((covariance_of_inverse(kPose, C) - expected).norm(), 1e-7 * expected.norm());
-}
-
 TEST(PoseError, CovarianceFollowsAProduct) {
     const Matrix6 J = numeric_jacobian([](const Rigid3& T) { return T * kOffset; });
     const Matrix6 C = some_covariance(), expected = J * C * J.transpose();

@@ -180,7 +180,7 @@ TEST(StereoMatcher, MatchesThroughLensesThatDistort) {
     EXPECT_LT(ignored->points.size(), found->points.size() / 2);
 }
 
-TEST(StereoMatcher, RefusesWhatRepeats) {
+TEST(StereoMatcher, RefusesRepeatedPatterns) {
     // A pattern of 1 m each way: six pixels, of which the line crosses twenty.
     const double k = 2 * std::numbers::pi;
     const Views v =
@@ -217,7 +217,7 @@ TEST(StereoMatcher, FindsNothingInNoiseOrInSaturatedImages) {
     EXPECT_GT(found->counts.cut_off, 50);
 }
 
-TEST(StereoMatcher, WhatNeitherNoiseNorReliefExplainsShowsInTheCovariance) {
+TEST(StereoMatcher, UnexplainedResidualsWidenTheCovariance) {
     // The right frame is three times as noisy as its detector is.
     Views v = views(kDown, waves());
     add_noise(v.pair.left, 1, v.left);

@@ -216,7 +216,7 @@ TEST(StereoTriangulation, DistinguishesFarFromBehind) {
     EXPECT_EQ(same.status, TriangulationStatus::no_parallax);
 }
 
-TEST(StereoTriangulation, RefusesWhatIsNoMeasurement) {
+TEST(StereoTriangulation, RefusesInvalidMeasurements) {
     const StereoPair good = descent_pair();
     const PixelMeasurement px = pixel({30, 40}, 0.1);
     const double nan = std::nan("");

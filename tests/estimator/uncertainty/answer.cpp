@@ -17,7 +17,7 @@ Fit good_fit() {
     return fit;
 }
 
-TEST(Answer, TheFirstFaultDecides) {
+TEST(Answer, TheFirstFailedTestDecides) {
     Fit fit = good_fit();
     EXPECT_EQ(judge(fit).kind, AnswerKind::good);
     EXPECT_TRUE(judge(fit).why.empty());
@@ -57,7 +57,7 @@ TEST(Answer, FarFromTheGuessIsRefused) {
     EXPECT_EQ(judge(fit).kind, AnswerKind::refused);
 }
 
-TEST(Answer, MotionsThatAreNotObservedAreNamedAndKnowNothing) {
+TEST(Answer, UnobservedMotionsAreListedWithoutInformation) {
     Matrix6 covariance = 1e-6 * Matrix6::Identity();
     covariance(2, 2) = 1;  // a radian of roll
     Fit fit;
@@ -112,7 +112,7 @@ TEST(ModelUncertainty, ShiftsAreThoseOfTheFit) {
 }
 
 /// A body as deep as it is near also turns with the focal length.
-TEST(ModelUncertainty, OfTheFocalLengthAsPointsWeighIt) {
+TEST(ModelUncertainty, FocalLengthShiftIsThatOfTheWeightedPoints) {
     constexpr double kPart = 1e-4;
     std::mt19937_64 random(5);
     const Rigid3 T{test::random_attitude(random), {0.2, -0.3, 3}};
@@ -131,7 +131,7 @@ TEST(ModelUncertainty, OfTheFocalLengthAsPointsWeighIt) {
     EXPECT_GT((moved - of_a_point).head<3>().norm(), 0.5 * of_a_point.head<3>().norm());
 }
 
-TEST(ModelUncertainty, RootsTakeItAsCovariancesDo) {
+TEST(ModelUncertainty, RootInformationEqualsTheInverseCovariance) {
     std::mt19937_64 random(4);
     const Rigid3 T{test::random_attitude(random), {1, 2, 30}};
     const PoseShifts shifts = image_shifts({.scale = 0.01, .boresight_rad = 1e-3}, T, {});

@@ -28,12 +28,12 @@ TEST(Leverage, ManyRowsCheckEachOther) {
     EXPECT_LT((in.information - 5 * Matrix6::Identity()).norm(), 1e-12);
 }
 
-TEST(Leverage, ThreeRowsMayHoldAMotion) {
+TEST(Leverage, ThreeRowsThatHoldAMotionCheckEachOther) {
     auto all = rows(5, 3);
     EXPECT_EQ(checked_information(all, kSpread, kThreshold).unchecked, 0);
 }
 
-TEST(Leverage, OneOrTwoRowsMayNot) {
+TEST(Leverage, OneOrTwoRowsThatHoldAMotionAreUnchecked) {
     for (const int n : {1, 2}) {
         auto all = rows(5, n);
         const CheckedInformation in = checked_information(all, kSpread, kThreshold);
@@ -45,7 +45,7 @@ TEST(Leverage, OneOrTwoRowsMayNot) {
 }
 
 /// A row that others check in part: what they hold of its motion remains.
-TEST(Leverage, WhatOthersHoldRemains) {
+TEST(Leverage, InformationOfCheckedRowsRemains) {
     auto all = rows(5, 5);
     Vector6 strong = Vector6::Zero();
     strong[5] = 100;
@@ -56,7 +56,7 @@ TEST(Leverage, WhatOthersHoldRemains) {
     EXPECT_LT((in.information - 5 * Matrix6::Identity()).norm(), 1e-9);
 }
 
-TEST(Leverage, RowsThatAreMarkedStayOut) {
+TEST(Leverage, RowsMarkedUncheckedAreLeftOut) {
     auto all = rows(5, 5);
     for (WeightedRow& row : all) row.checked = row.measurement % 5 != 0;
     const CheckedInformation in = checked_information(all, kSpread, kThreshold);

@@ -18,12 +18,12 @@ Matrix6 lopsided_covariance() {
     return root * root.transpose();
 }
 
-TEST(Response, OfTheIdentityChangesNothing) {
+TEST(Response, OfIdentityKeepsTheCovariance) {
     const Matrix6 C = lopsided_covariance();
     EXPECT_LT((covariance_by_response(C, Matrix6::Identity()) - C).norm(), 1e-12 * C.norm());
 }
 
-TEST(Response, ToHalfOfAMotionIsFourTimesItsVariance) {
+TEST(Response, OfOneHalfQuadruplesTheVariance) {
     Matrix6 response = Matrix6::Identity();
     response(2, 2) = 0.5;
     const Matrix6 C = covariance_by_response(Matrix6::Identity(), response);
@@ -31,7 +31,7 @@ TEST(Response, ToHalfOfAMotionIsFourTimesItsVariance) {
     EXPECT_NEAR(C(1, 1), 1, 1e-12);
 }
 
-TEST(Response, ToMoreThanAMotionTakesNothingAwayUnlessAsked) {
+TEST(Response, AboveOneReducesVarianceOnlyUpToItsLimit) {
     EXPECT_LT(
         (covariance_by_response(lopsided_covariance(), 3 * Matrix6::Identity()) - lopsided_covariance()).norm(),
         1e-12);
@@ -39,7 +39,7 @@ TEST(Response, ToMoreThanAMotionTakesNothingAwayUnlessAsked) {
     EXPECT_LT((taken - lopsided_covariance() / 2.25).norm(), 1e-12);
 }
 
-TEST(Response, ToLessThanHalfOfAMotionTakesNothingOfOthersAway) {
+TEST(Response, BelowOneHalfKeepsOtherVariances) {
     Matrix6 response = 2 * Matrix6::Identity();
     response(2, 2) = 0.6;
     EXPECT_NEAR(covariance_by_response(Matrix6::Identity(), response, 1.5)(0, 0), 1 / 2.25, 1e-12);
@@ -48,17 +48,17 @@ TEST(Response, ToLessThanHalfOfAMotionTakesNothingOfOthersAway) {
 }
 
 /// What a measurement shows of nothing is not known.
-TEST(Response, ToNothingIsBeyondAllLimits) {
+TEST(Response, OfZeroMakesAMotionUnobserved) {
     Matrix6 response = Matrix6::Identity();
     response(0, 0) = 0;
     const Matrix6 C = covariance_by_response(Matrix6::Identity(), response);
-    EXPECT_NEAR(C(0, 0), 1 / (kMinShown * kMinShown), 1);
+    EXPECT_NEAR(C(0, 0), 1 / (kResponseMin * kResponseMin), 1);
     EXPECT_NEAR(C(3, 3), 1, 1e-9);
 }
 
 /// Scatter of poses where J' r = 0, and the covariance that is stated for them: J is wrong by as much as it holds
 /// of one motion.
-TEST(Response, StatesTheScatterOfPosesFromAWrongJacobian) {
+TEST(Response, CovarianceIsTheScatterOfPosesFromAWrongJacobian) {
     constexpr int kPixels = 60, kDraws = 4000;
     std::mt19937_64 random(5);
     std::normal_distribution<double> normal;

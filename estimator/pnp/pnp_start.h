@@ -3,9 +3,7 @@
 /// Scaled orthography with its correction for perspective (POSIT; DeMenthon and Davis, "Model-based object pose in
 /// 25 lines of code"; for planes Oberkampf, DeMenthon and Davis, "Iterative pose estimation using coplanar feature
 /// points") takes a microsecond and converges wherever the body is not much wider than it is distant. Elsewhere
-/// OpenCV's SQPNP serves. In 34 settings of 300 draws (docs/pose-from-points.md) both together failed in 316, POSIT
-/// alone in 763, SQPNP alone in 574; IPPE and the poses of triples of four or five points changed nothing (316,
-/// 314).
+/// OpenCV's SQPNP serves. Other sources were measured and left out: docs/pose-from-points.md.
 #pragma once
 
 #include <optional>

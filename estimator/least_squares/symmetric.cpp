@@ -13,8 +13,7 @@ SymmetricEigen symmetric_eigen(const Matrix6& A) {
 
 Cholesky cholesky(const Matrix6& A) {
     const Eigen::LLT<Matrix6> factor(A);
-    const Matrix6 L = factor.matrixL();
-    return {L, factor.info() == Eigen::Success && L.allFinite()};
+    return {factor.matrixL(), factor.info() == Eigen::Success};
 }
 
 Vector6 lower_solve(const Matrix6& L, const Vector6& b) {
@@ -23,10 +22,6 @@ Vector6 lower_solve(const Matrix6& L, const Vector6& b) {
 
 Matrix6 lower_solve(const Matrix6& L, const Matrix6& B) {
     return L.triangularView<Eigen::Lower>().solve(B);
-}
-
-Vector6 upper_solve(const Matrix6& L, const Vector6& b) {
-    return L.transpose().triangularView<Eigen::Upper>().solve(b);
 }
 
 Vector6 ldlt_solve(const Matrix6& A, const Vector6& b) {

@@ -17,14 +17,12 @@ struct SymmetricEigen {
 /// A = L L', A symmetric: its lower triangle is read.
 struct Cholesky {
     Matrix6 L;                       ///< zero above the diagonal; meaningless unless positive_definite
-    bool positive_definite = false;  ///< A, within rounding; false if not finite
+    bool positive_definite = false;  ///< A, within rounding
 };
 [[nodiscard]] Cholesky cholesky(const Matrix6& A);
 /// L^-1 b with a lower triangular L.
 [[nodiscard]] Vector6 lower_solve(const Matrix6& L, const Vector6& b);
 [[nodiscard]] Matrix6 lower_solve(const Matrix6& L, const Matrix6& B);
-/// L'^-1 b.
-[[nodiscard]] Vector6 upper_solve(const Matrix6& L, const Vector6& b);
 
 /// A^-1 b by L D L' with pivots: A is symmetric and positive or negative semidefinite, and its lower triangle is
 /// read.

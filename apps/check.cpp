@@ -405,8 +405,8 @@ nlohmann::json describe(const rehearsal::Scenario& s) {
             std::ceil(s.legs_duration_s())));
     say(fmt::format("  scene: {}", s.scene));
     std::vector<std::string> sensors = n.cameras;
-    if (n.camera_method == CameraMethod::dense)
-        for (std::string& camera : sensors) camera += " (all pixels)";
+    if (n.camera_method != &camera_methods().front())
+        for (std::string& camera : sensors) camera += fmt::format(" ({})", n.camera_method->measures);
     sensors.insert(sensors.end(), n.lidars.begin(), n.lidars.end());
     say(fmt::format("  {} flies to {}, by {}", s.chaser.body, s.target.body, fmt::join(sensors, ", ")));
     say(fmt::format("  legs: {}", fmt::join(names(s.legs), ", ")));

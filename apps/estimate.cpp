@@ -85,7 +85,7 @@ Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_opt
     if (!tracked) return tracked.error();
     const Scene& scene = (*run)->world().scene();
     const std::string target = scene.bodies[(*tracker)->target()].name;
-    const std::string_view method = kCameraMethods[static_cast<std::size_t>(tracker_options.method)];
+    const std::string_view method = tracker_options.method->name;
     const EstimateSummary summary = summarise(*tracked);
     say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target, method,
                     to_text(summary)));
@@ -248,10 +248,10 @@ Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
         };
         threads.arena.execute([&] {
             take();
-            if (!options.guess || !tracked.measured || options.search || options.method == CameraMethod::dense)
+            if (!options.guess || !tracked.measured || options.search ||
+                !options.method->light_is_that_of_the_guess)
                 return;
-            // Features are rendered with the illumination at the guessed attitude: repeat with that at the
-            // estimated one.
+            // Repeats with the illumination at the estimated attitude.
             at.set(*target, T_world_camera * *tracked.measured);
             take();
         });

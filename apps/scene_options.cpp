@@ -172,10 +172,9 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
     app.option(dashes + "target", tracker.target,
                "Body whose pose is estimated (default: the first with a mesh that does not carry the camera)")
         .type_name("BODY");
-    app.option(dashes + "method", method,
-               "features: points of the frame and of a render; dense: all pixels, starting from the features' pose")
-        .one_of({"features", "dense"})
-        .shows_default();
+    std::vector<std::string> methods;
+    for (const CameraMethod& m : camera_methods()) methods.emplace_back(m.name);
+    app.option(dashes + "method", method, help_of_camera_methods()).one_of(methods).shows_default();
     app.option(
            dashes + "start", start,
            "Error of the first guess, made from the truth: attitude, and part of the range; search: no guess, for "
@@ -191,8 +190,9 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
                "What is not exact in the scene, standard deviations: " + names_of_model_errors())
         .type_name("NAME=VALUE,...");
     app.option(dashes + "frame-noise", tracker.frame_noise_dn,
-               "With dense or search: noise of the frames beside the detector's, standard deviation; 0 of a real "
-               "camera (default: not known, so that only large residuals are refused)")
+               "With " + camera_methods_that_take_noise() +
+                   " or search: noise of the frames beside the detector's, standard deviation; 0 of a real "
+                   "camera (default: not known, so that only large residuals are refused)")
         .type_name("DN")
         .range(0.0, 1e5);
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();
@@ -203,10 +203,11 @@ Result<TrackerOptions> TrackerFlags::options() const {
     auto model = model_uncertainty(uncertainty, dashes + "uncertainty");
     if (!model) return model.error();
     o.model = *model;
-    o.method = method == "dense" ? CameraMethod::dense : CameraMethod::features;
+    o.method = find_camera_method(method);  // `method` is one of the table's
     o.search = start == "search";
-    if (o.frame_noise_dn && o.method != CameraMethod::dense && !o.search)
-        return Error{dashes + "frame-noise is for all pixels: expected --method dense, or --start search"};
+    if (o.frame_noise_dn && !o.method->takes_frame_noise && !o.search)
+        return Error{fmt::format("{}frame-noise is for all pixels: expected --method {}, or --start search", dashes,
+                                 camera_methods_that_take_noise())};
     if (o.search) return o;
     if (o.range_guess_m > 0)
         return Error{fmt::format("a range is guessed for a start by search, not \"{}\"", start)};

@@ -40,7 +40,7 @@ Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::s
 
 /// Settings of pose estimation: options of `estimate` and of `run --estimate`.
 struct TrackerFlags {
-    std::string method = "features";
+    std::string method{camera_methods().front().name};
     std::string start = "2,2";
     std::string uncertainty;
     std::string dashes = "--";  ///< before the options' names

@@ -43,61 +43,29 @@ Camera without(const std::vector<std::string>& ignored, Camera camera) {
     return camera;
 }
 
-/// One method, initialised for the camera and the target.
-class Method {
-public:
-    Method(CameraMethod method, const World& world, const Camera& camera, std::size_t target,
-           const ApproachOptions& o)
-        : method_(method) {
-        const BodyPoses at(world.scene().bodies.size());
-        if (method == CameraMethod::features) {
-            FeatureSettings settings;
-            settings.seed = o.seed;
-            points_.emplace(world.render_scene(), camera, target, at, settings);
-        } else {
-            dense_.seed = o.seed;
-            dense_.method = world.scene().render.method;
-            dense_.max_depth = world.scene().render.max_depth;
-            pixels_.emplace(world.render_scene(), camera, target);
-        }
-    }
-
-    /// `off`: the error of the guess.
-    ApproachFrame estimate(const ApproachView& view, const Rigid3& guess, const Vector6& off, bool with_bound) {
-        ApproachFrame out;
-        out.range_m = norm(view.truth.t);
-        const std::int64_t start_ns = monotonic_ns();
-        dense_.motion = view.motion;
-        Rigid3 T{};
-        Matrix6 covariance = Matrix6::Zero(), bound = Matrix6::Zero();
-        if (method_ == CameraMethod::features) {
-            const FeatureEstimate e = points_->align(view.image, view.at, guess, view.motion);
-            out.claimed = e.answer.usable(), out.why = e.answer.why,
-            out.renders = static_cast<int>(e.rounds.size());
-            T = e.T_camera_target, covariance = e.covariance, bound = e.bound;
-        } else if (const auto e = pixels_->align(view.image, view.at, guess, dense_, view.variance_dn2)) {
-            out.claimed = e->answer.usable(), out.why = e->answer.why, out.renders = e->renders;
-            T = e->T_camera_body, covariance = e->covariance;
-        }
-        out.ms = seconds_since(start_ns) * 1e3;
-        if (!out.claimed) return out;
-        const Vector6 error = error_between(T, view.truth);
-        out.rotation_rad = error.head<3>().norm(), out.position_m = error.tail<3>().norm();
-        out.nees = normalised_error_squared(error, covariance);
-        out.found = out.rotation_rad < kFoundPart * off.head<3>().norm() &&
-                    out.position_m < kFoundPart * off.tail<3>().norm();
-        if (method_ == CameraMethod::dense && with_bound && out.found)
-            if (const auto least = pixels_->bound(view.at, view.truth, dense_, view.variance_dn2)) bound = *least;
-        out.bound_rotation_rad = rotation_sigma(bound), out.bound_position_m = position_sigma(bound);
-        return out;
-    }
-
-private:
-    CameraMethod method_;
-    std::optional<FeatureAlignment> points_;
-    std::optional<DenseAlignment> pixels_;
-    DenseOptions dense_;
-};
+/// `off`: the error of the guess.
+ApproachFrame estimate(FrameEstimator& method, const ApproachView& view, const Rigid3& guess, const Vector6& off,
+                       bool with_bound) {
+    ApproachFrame out;
+    out.range_m = norm(view.truth.t);
+    const std::int64_t start_ns = monotonic_ns();
+    const FrameInput frame{
+        .image = view.image, .at = view.at, .guess = guess, .motion = view.motion, .variance = view.variance_dn2};
+    const auto e = method.estimate(frame);
+    out.ms = seconds_since(start_ns) * 1e3;
+    if (!e) return out;
+    out.claimed = e->answer.usable(), out.why = e->answer.why, out.renders = e->renders;
+    if (!out.claimed) return out;
+    const Vector6 error = error_between(e->T_camera_target, view.truth);
+    out.rotation_rad = error.head<3>().norm(), out.position_m = error.tail<3>().norm();
+    out.nees = normalised_error_squared(error, e->covariance);
+    out.found =
+        out.rotation_rad < kFoundPart * off.head<3>().norm() && out.position_m < kFoundPart * off.tail<3>().norm();
+    if (!with_bound || !out.found) return out;
+    if (const auto bound = method.bound(frame, view.truth))
+        out.bound_rotation_rad = rotation_sigma(*bound), out.bound_position_m = position_sigma(*bound);
+    return out;
+}
 
 ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, double to_m) {
     ApproachBand b{from_m, to_m};
@@ -194,10 +162,10 @@ std::vector<ApproachRun> run_approach(const World& world, std::size_t camera_ind
     const Camera& camera = world.scene().cameras[camera_index];
     ApproachFrames frames(world, camera, target, o);
     std::vector<ApproachRun> runs;
-    std::deque<Method> methods;  // stable addresses
-    for (const CameraMethod m : o.methods) {
-        methods.emplace_back(m, world, without(o.ignored, camera), target, o);
-        runs.push_back({m, {}, {}, {}});
+    std::vector<std::unique_ptr<FrameEstimator>> methods;
+    for (const CameraMethod& m : o.methods) {
+        methods.push_back(m.make(world.render_scene(), without(o.ignored, camera), target, {.seed = o.seed}));
+        runs.push_back({&m, {}, {}, {}});
     }
     // All methods estimate from the same frames and starts.
     std::mt19937_64 random(o.seed);
@@ -208,7 +176,7 @@ std::vector<ApproachRun> run_approach(const World& world, std::size_t camera_ind
             const Vector6 off =
                 random_error(o.start_deg * kDegree, 0.01 * o.start_percent * norm(view.truth.t), random);
             for (std::size_t m = 0; m < methods.size(); ++m)
-                runs[m].frames.push_back(methods[m].estimate(view, displaced(view.truth, off), off, true));
+                runs[m].frames.push_back(estimate(*methods[m], view, displaced(view.truth, off), off, true));
         });
     }
     for (const double deg : o.basin_trials > 0 ? o.basin : std::vector<double>{}) {
@@ -220,7 +188,7 @@ std::vector<ApproachRun> run_approach(const World& world, std::size_t camera_ind
                     frames.make_at(o.basin_range_m, static_cast<std::uint32_t>(o.frames + k));
                 const Vector6 off = random_error(deg * kDegree, 0.01 * deg * norm(view.truth.t), random);
                 for (std::size_t m = 0; m < methods.size(); ++m) {
-                    cells[m].found += methods[m].estimate(view, displaced(view.truth, off), off, false).found;
+                    cells[m].found += estimate(*methods[m], view, displaced(view.truth, off), off, false).found;
                     ++cells[m].trials;
                 }
             });

@@ -19,7 +19,7 @@
 namespace narpa {
 
 struct ApproachOptions {
-    std::vector<CameraMethod> methods{CameraMethod::features, CameraMethod::dense};
+    std::span<const CameraMethod> methods = camera_methods();
     int frames = 200;
     double from_m = 100, to_m = 1.2;  ///< range, target's origin to camera; in equal steps of its logarithm
     Vec3 along{1, 0, 0};              ///< from the target towards the camera, target axes
@@ -68,7 +68,7 @@ struct BasinCell {
 };
 
 struct ApproachRun {
-    CameraMethod method{};
+    const CameraMethod* method = nullptr;
     std::vector<ApproachFrame> frames;
     std::vector<ApproachBand> bands;  ///< the last is over all frames
     std::vector<BasinCell> basin;

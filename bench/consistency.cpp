@@ -10,7 +10,7 @@
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
-#include "estimator/pose/pnp.h"
+#include "estimator/pnp/pnp.h"
 #include "estimator/search/cloud_search.h"
 #include "estimator/search/template_matcher.h"
 #include "protocols/lidar/velodyne.h"

@@ -13,7 +13,7 @@
 #include "base/result.h"
 #include "base/stop.h"
 #include "emulator/threads.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "protocols/estimate.h"
 
 namespace narpa {

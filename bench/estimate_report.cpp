@@ -24,10 +24,6 @@ using nlohmann::json;
 
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
-std::string name_of(CameraMethod m) {
-    return std::string(kCameraMethods[static_cast<std::size_t>(m)]);
-}
-
 }  // namespace
 
 // JSON keys are the members' names. Infinity becomes null.
@@ -96,7 +92,7 @@ json to_json(const std::vector<ApproachRun>& runs) {
     json all = json::array();
     for (const ApproachRun& run : runs)
         all.push_back(
-            {{"method", name_of(run.method)}, {"bands", run.bands}, {"basin", run.basin}, {"frames", run.frames}});
+            {{"method", run.method->name}, {"bands", run.bands}, {"basin", run.basin}, {"frames", run.frames}});
     return all;
 }
 
@@ -113,12 +109,11 @@ std::string to_text(const std::vector<ApproachRun>& runs) {
             out += fmt::format(
                 "{:<10} {:>14} {:>4}/{:<4} {:>6} {:>11.4f} {:>11.3g} {:>7.2f} {:>7.2f} {:>6.1f} {:>8.1f} "
                 "{:>8.0f}\n",
-                name_of(run.method), range, b.found, b.frames, b.wrong, b.rotation_rms_rad / kDegree,
-                b.position_rms_m, b.rotation_of_bound, b.position_of_bound, b.nees_median, b.renders_mean,
-                b.ms_median);
+                run.method->name, range, b.found, b.frames, b.wrong, b.rotation_rms_rad / kDegree, b.position_rms_m,
+                b.rotation_of_bound, b.position_of_bound, b.nees_median, b.renders_mean, b.ms_median);
         }
         if (run.basin.empty()) continue;
-        out += fmt::format("{:<10} found from starts off by", name_of(run.method));
+        out += fmt::format("{:<10} found from starts off by", run.method->name);
         for (const BasinCell& c : run.basin)
             out += fmt::format("  {:g}: {}/{}", c.off_deg_and_percent, c.found, c.trials);
         out += " (degrees and % of the range)\n";

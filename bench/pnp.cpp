@@ -6,7 +6,7 @@
 #include "base/time.h"
 #include "bench/pnp_methods.h"
 #include "bench/statistics.h"
-#include "estimator/pose/pnp_refine.h"
+#include "estimator/pnp/pnp_refine.h"
 
 namespace narpa {
 namespace {

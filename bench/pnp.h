@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/stop.h"
-#include "estimator/pose/pnp_points.h"
+#include "estimator/pnp/pnp_points.h"
 
 namespace narpa {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
-#include "estimator/pose/pnp.h"
+#include "estimator/pnp/pnp.h"
 
 namespace narpa {
 namespace {
@@ -23,6 +23,12 @@ struct CvTrial {
           pixels(static_cast<int>(t.pixels.size()), 1, CV_64FC2, const_cast<Pixel*>(t.pixels.data())) {}
 };
 
+PoseResult finite_pose(const cv::Mat& r, const cv::Mat& t) {
+    const Rigid3 T{exp_rotation({r.at<double>(0), r.at<double>(1), r.at<double>(2)}),
+                   {t.at<double>(0), t.at<double>(1), t.at<double>(2)}};
+    return std::isfinite(norm(T.q)) && is_finite(T.t) ? PoseResult{T} : PoseResult{};
+}
+
 /// `solve(trial, rotation, translation)` returns whether it found a pose. None where OpenCV throws: a method that
 /// does not take so few points, or this shape.
 template <class Solve>
@@ -33,9 +39,7 @@ PoseResult by_opencv(const PnpTrial& trial, const Solve& solve) {
     } catch (const cv::Exception&) {
         return {};
     }
-    const Rigid3 T{exp_rotation({r.at<double>(0), r.at<double>(1), r.at<double>(2)}),
-                   {t.at<double>(0), t.at<double>(1), t.at<double>(2)}};
-    return std::isfinite(norm(T.q)) && is_finite(T.t) ? PoseResult{T} : PoseResult{};
+    return finite_pose(r, t);
 }
 
 PoseResult by_opencv_ransac(const PnpTrial& trial) {
@@ -116,16 +120,22 @@ PoseResult by_ceres(const PnpTrial& trial, std::span<const Rigid3> starts) {
     return best;
 }
 
+/// From all poses of SQPNP and, for planes, of IPPE.
 PoseResult by_opencv_and_ceres(const PnpTrial& trial, bool flat) {
-    PnpPoints points(kPointsMax);
-    points.assign(trial.input());
-    std::vector<BodyPoint> normalised;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        normalised.push_back({points.centred_body_m(i), points.normalised(i)});
-    std::vector<CentredPose> poses;
-    opencv_poses(normalised, flat, poses);
+    const CvTrial c(trial);
     std::vector<Rigid3> starts;
-    for (const CentredPose& pose : poses) starts.push_back(points.uncentred(pose));
+    for (const auto method : {cv::SOLVEPNP_SQPNP, cv::SOLVEPNP_IPPE}) {
+        if (method == cv::SOLVEPNP_IPPE && !flat) continue;
+        std::vector<cv::Mat> rotations, translations;
+        try {
+            cv::solvePnPGeneric(c.points, c.pixels, c.K, cv::noArray(), rotations, translations, false, method);
+        } catch (const cv::Exception&) {
+            continue;
+        }
+        for (std::size_t i = 0; i < rotations.size(); ++i)
+            if (const PoseResult found = finite_pose(rotations[i], translations[i]); found.T_camera_body)
+                starts.push_back(*found.T_camera_body);
+    }
     return by_ceres(trial, starts);
 }
 

@@ -17,7 +17,7 @@ enum class EstimateState : std::uint8_t {
 };
 inline constexpr std::array<std::string_view, 3> kEstimateStates{"lost", "predicted", "measured"};
 
-/// Quality of a pose that was estimated from one frame or sweep (estimator/pose/answer.h).
+/// Quality of a pose that was estimated from one frame or sweep (estimator/uncertainty/answer.h).
 enum class AnswerKind : std::uint8_t {
     good,          ///< correct within its covariance
     ambiguous,     ///< another pose explains the measurement nearly as well

@@ -6,8 +6,6 @@
 
 #include "base/time.h"
 #include "emulator/camera/camera_control.h"
-#include "estimator/dense/dense_alignment.h"
-#include "estimator/features/feature_alignment.h"
 #include "estimator/search/pose_search.h"
 
 namespace narpa {
@@ -87,14 +85,10 @@ FrameTracker::FrameTracker(const World& world, std::size_t camera, std::size_t t
       options_(options),
       random_(options.seed),
       tracker_(tracker_settings(options)) {
-    FeatureSettings features;
-    features.spp = options.spp;
-    features.model = options.model;
-    features.seed = ~options.seed;  // independent of the frames, whose seed may be the same
-    features_ = std::make_unique<FeatureAlignment>(world.render_scene(), camera_, target,
-                                                   BodyPoses(world.scene().bodies.size()), features);
-    if (options.method == CameraMethod::dense)
-        pixels_ = std::make_unique<DenseAlignment>(world.render_scene(), camera_, target);
+    // The seed is independent of the frames, whose seed may be the same.
+    estimator_ = options.method->make(
+        world.render_scene(), camera_, target,
+        {.seed = ~options.seed, .spp = options.spp, .starts_from_features = true, .model = options.model});
     if (options.search) search_ = std::make_unique<PoseSearch>(world.render_scene(), camera_, target);
 }
 FrameTracker::~FrameTracker() = default;
@@ -112,8 +106,7 @@ Status FrameTracker::set(const FrameLedger& ledger) {
     const Camera& as_in_the_scene = world_.scene().cameras[index_];
     const CameraSettings taken = settings_of(ledger, as_in_the_scene);
     apply(taken, as_in_the_scene, camera_);
-    features_->set_detector(*camera_.detector);
-    if (pixels_) pixels_->set_detector(*camera_.detector);
+    estimator_->set_detector(*camera_.detector);
     if (search_) search_->set_detector(*camera_.detector);
     if (taken.binning == 1 && taken.region.width == camera_.width && taken.region.height == camera_.height)
         return Ok{};
@@ -158,12 +151,22 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
     } else if (!searches()) {
         out.guess = options_.guess ? *options_.guess : displaced_truth(out.truth, options_, random_);
     }
-    const ApparentMotion moving = motion(ledger, at, out.guess);
     const bool searched = searches();
-    if (const Status usable = set(ledger); usable)
-        measure(bytes, at, T_world_camera, moving, out);
+    const ApparentMotion moving = motion(ledger, at, out.guess);
+    const Status usable = set(ledger);
+    const Result<MeasuredImage> image =
+        usable ? measured_image(camera_, bytes) : Result<MeasuredImage>(usable.error());
+    const MeasuredImage none;
+    const std::vector<float> variance = frame_variance();
+    FrameInput frame{
+        .image = image ? *image : none, .at = at, .guess = out.guess, .motion = moving, .variance = variance};
+    // Without a truth, the target's attitude in the world, and so its light, is known only by the camera's
+    // attitude.
+    if (options_.guess) frame.T_world_camera = T_world_camera;
+    if (image)
+        measure(frame, T_world_camera, out);
     else
-        out.why = usable.error().what;
+        out.why = image.error().what;
     if (out.measured) {
         // The model's errors are common to all frames, so the filter gets the covariance without them.
         PoseMeasurement measurement{t_ns, *out.measured, out.covariance - out.covariance_of_model,
@@ -187,11 +190,10 @@ TrackedFrame FrameTracker::take(const FrameLedger& ledger, std::span<const std::
         if (out.state == EstimateState::lost) out.state = EstimateState::predicted;
     }
     out.ms = seconds_since(start_ns) * 1e3;
-    if ((searched || pixels_) && out.measured) {  // after the estimate, and not part of its time
+    if (out.measured) {  // after the estimate, and not part of its time
         const Rigid3& there = options_.guess ? *out.measured : out.truth;
-        const DenseOptions dense = dense_options(searched ? ApparentMotion{} : moving, T_world_camera);
-        const auto bound = searched ? search_->bound(at, T_world_camera, there, dense, frame_variance())
-                                    : pixels_->bound(at, there, dense, frame_variance());
+        const auto bound = searched ? search_->bound(at, T_world_camera, there, dense_options(), variance)
+                                    : estimator_->bound(frame, there);
         if (bound) out.bound = *bound;
     }
     return out;
@@ -201,54 +203,28 @@ bool FrameTracker::searches() const {
     return search_ && !tracker_.started();
 }
 
-void FrameTracker::measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const Rigid3& T_world_camera,
-                           const ApparentMotion& motion, TrackedFrame& out) {
-    const auto image = measured_image(camera_, bytes);
-    if (!image) {
-        out.why = image.error().what;
-        return;
-    }
+void FrameTracker::measure(const FrameInput& frame, const Rigid3& T_world_camera, TrackedFrame& out) {
     if (searches()) {
-        measure_by_search(*image, at, T_world_camera, out);
+        measure_by_search(frame, T_world_camera, out);
         return;
     }
-    measure_by_features(*image, at, motion, out);
-    if (pixels_) measure_by_pixels(*image, at, dense_options(motion, T_world_camera), out);
-}
-
-void FrameTracker::measure_by_features(const MeasuredImage& image, const BodyPoses& at,
-                                       const ApparentMotion& motion, TrackedFrame& out) {
-    const FeatureEstimate e = features_->align(image, at, out.guess, motion);
-    out.matches = e.agreeing;
-    out.renders = static_cast<int>(e.rounds.size());
-    take_answer(e, e.T_camera_target, out);
-    if (out.measured) out.bound = e.bound;
-}
-
-/// Starts from the pose by features; without one, from the guess.
-void FrameTracker::measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const DenseOptions& options,
-                                     TrackedFrame& out) {
-    DenseOptions dense = options;
-    if (out.measured) dense.coarsest = 1;
-    const auto e = pixels_->align(image, at, out.measured.value_or(out.guess), dense, frame_variance());
-    out.measured.reset();
+    const auto e = estimator_->estimate(frame);
     if (!e) {
         out.why = e.error().what;
         return;
     }
-    out.matches = static_cast<int>(e->pixels);
-    out.renders += e->renders;
-    take_answer(*e, e->T_camera_body, out);
+    out.matches = e->measurements;
+    out.renders = e->renders;
+    take_answer(*e, e->T_camera_target, out);
 }
 
-void FrameTracker::measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
-                                     TrackedFrame& out) {
+void FrameTracker::measure_by_search(const FrameInput& frame, const Rigid3& T_world_camera, TrackedFrame& out) {
     SearchOptions o;
     const double most = options_.guess ? 0 : o.range_part;
     const double off = std::uniform_real_distribution(-most, most)(random_);
     o.range_m = options_.range_guess_m > 0 ? options_.range_guess_m : norm(out.truth.t) / (1 + off);
-    o.dense = dense_options({}, T_world_camera);
-    const auto e = search_->find(image, at, T_world_camera, o, frame_variance());
+    o.dense = dense_options();
+    const auto e = search_->find(frame.image, frame.at, T_world_camera, o, frame.variance);
     if (!e) {
         out.why = e.error().what;
         return;
@@ -265,13 +241,9 @@ std::vector<float> FrameTracker::frame_variance() const {
                               static_cast<float>(std::pow(*options_.frame_noise_dn, 2)));
 }
 
-/// Without a truth, the target's attitude in the world, and so its illumination, is known only through the camera's
-/// attitude.
-DenseOptions FrameTracker::dense_options(const ApparentMotion& motion, const Rigid3& T_world_camera) const {
+DenseOptions FrameTracker::dense_options() const {
     DenseOptions dense;
-    dense.motion = motion;
     dense.model = options_.model;
-    if (options_.guess) dense.T_world_camera = T_world_camera;
     dense.seed = ~options_.seed;
     dense.method = world_.scene().render.method;
     dense.max_depth = world_.scene().render.max_depth;

@@ -14,24 +14,21 @@
 #include "base/result.h"
 #include "emulator/world.h"
 #include "estimator/filter/pose_filter.h"
-#include "estimator/pose/answer.h"
+#include "estimator/method/camera_method.h"
 #include "estimator/pose/apparent_motion.h"
-#include "estimator/pose/camera_method.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "protocols/estimate.h"
 #include "protocols/ledger.h"
 
 namespace narpa {
 
-class DenseAlignment;
 struct DenseOptions;
-class FeatureAlignment;
 class PoseSearch;
-struct MeasuredImage;
 
 struct TrackerOptions {
     std::string target;  ///< name of the body; empty: the first with a mesh that does not carry the camera
-    CameraMethod method = CameraMethod::features;  ///< dense starts from where the features lead
+    const CameraMethod* method = &camera_methods().front();  ///< those that can start from where features lead
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
     bool search = false;       ///< without an initial pose, from a range known to 30 % (estimator/search)
     double range_guess_m = 0;  ///< for the search; 0: the truth, off by up to 30 %, or the guess
@@ -104,16 +101,11 @@ private:
     /// without a shutter.
     [[nodiscard]] ApparentMotion motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const;
     [[nodiscard]] bool searches() const;  ///< the next frame is searched: there is no pose yet
-    void measure(std::span<const std::uint8_t> bytes, const BodyPoses& at, const Rigid3& T_world_camera,
-                 const ApparentMotion& motion, TrackedFrame& out);
-    void measure_by_features(const MeasuredImage& image, const BodyPoses& at, const ApparentMotion& motion,
-                             TrackedFrame& out);
-    void measure_by_pixels(const MeasuredImage& image, const BodyPoses& at, const DenseOptions& options,
-                           TrackedFrame& out);
+    void measure(const FrameInput& frame, const Rigid3& T_world_camera, TrackedFrame& out);
     /// Without a guess. Assumes that the target stands still during the exposure.
-    void measure_by_search(const MeasuredImage& image, const BodyPoses& at, const Rigid3& T_world_camera,
-                           TrackedFrame& out);
-    [[nodiscard]] DenseOptions dense_options(const ApparentMotion& motion, const Rigid3& T_world_camera) const;
+    void measure_by_search(const FrameInput& frame, const Rigid3& T_world_camera, TrackedFrame& out);
+    /// Of the search and its bound.
+    [[nodiscard]] DenseOptions dense_options() const;
     [[nodiscard]] std::vector<float> frame_variance() const;  ///< of each pixel; empty: not known
     /// The pose is accurate enough to start an alignment of a render.
     [[nodiscard]] bool is_tracked(const Quat& q_frame_chaser) const;
@@ -125,9 +117,8 @@ private:
     std::size_t index_, target_;
     TrackerOptions options_;
     std::mt19937_64 random_;
-    std::unique_ptr<FeatureAlignment> features_;
-    std::unique_ptr<DenseAlignment> pixels_;  ///< by method `dense`
-    std::unique_ptr<PoseSearch> search_;      ///< where the options ask for it
+    std::unique_ptr<FrameEstimator> estimator_;
+    std::unique_ptr<PoseSearch> search_;  ///< where the options ask for it
     PoseTracker tracker_;
     /// Of the newest measurement that the filter took. This part is common to all measurements, so the filter must
     /// not average it.

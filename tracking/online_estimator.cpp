@@ -17,7 +17,7 @@ OnlineEstimator::OnlineEstimator(std::unique_ptr<FrameTracker> tracker, const Wo
       camera_(world.scene().cameras[camera].name),
       target_(world.scene().bodies[tracker_->target()].name),
       title_(fmt::format("{}: {} seen by {}, by {}", world.scene().name, target_, camera_,
-                         kCameraMethods[static_cast<std::size_t>(tracker_->options().method)])) {
+                         tracker_->options().method->name)) {
     if (!lockstep) single_threaded_.emplace();
 }
 

@@ -142,7 +142,7 @@ Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
         Mean position;
         for (const ApproachFrame& f : run.frames)
             if (f.found) position.add(f.position_m / f.range_m);
-        const std::string name(kCameraMethods[static_cast<std::size_t>(run.method)]);
+        const std::string name(run.method->name);
         if (position.count() > 0)
             findings.add(name, "render and compare", run.bands.back().ms_median, position.rms());
     }

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "base/constants.h"
-#include "estimator/pose/median.h"
-#include "estimator/pose/root_information.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/median.h"
+#include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/root_information.h"
 
 namespace narpa {
 namespace {
@@ -18,19 +18,19 @@ constexpr std::size_t kFewestBeams = 6;
 constexpr std::size_t kSearchPoints = 100;  ///< approximate number of the sweep's points that the search uses
 constexpr int kSearchIterations = 10;       ///< of the search, each with a smaller radius
 constexpr double kUnobservedBelow = 1e-3;   ///< normalised eigenvalue (observability.h)
-constexpr double kLastCircle = 0.02;        ///< last search radius over the first
+constexpr double kLastRadius = 0.02;        ///< last search radius over the first
 constexpr double kExplained = 4;            ///< standard deviations within which a point lies on the model
 constexpr double kOutlierCost = 0.5 * kExplained * kExplained, kUsualCost = 0.5;
 /// An estimate may have rivals if it has fewer points, a smaller normalised eigenvalue, a larger part of points off
 /// the model, or a cost this many standard deviations above that of noise.
 constexpr std::size_t kManyPoints = 150;
-constexpr double kWeak = 0.01, kFewElsewhere = 0.02, kMoreThanNoise_sigmas = 4;
+constexpr double kWeakEigenvalue = 0.01, kPartElsewhereMax = 0.02, kMoreThanNoise_sigmas = 4;
 /// Rivals are searched about the best of them, repeatedly, at most this many times.
-constexpr int kCompetitions = 4;
+constexpr int kRivalSearchesMax = 4;
 /// A rival is better if its cost (half a chi-square) is smaller by at least this.
 constexpr double kBetter = 0.5;
 /// Radius of a repeated search about a minimum with points beside the model, over the points' RMS radius.
-constexpr double kBesideCircle = 0.15;
+constexpr double kRefitRadius = 0.15;
 /// Radius about a beam in which other surfaces are searched, in standard deviations of the range.
 constexpr double kElsewhere_sigmas = 2;
 /// An answer further from the guess than this many times the search radius is a symmetric pose of the target, or
@@ -58,7 +58,7 @@ double surface_motion_m(const Vector6& pose_step, double reach_m) {
 
 /// True if, along some observed motion, more than the part kMax of the information comes from points not in
 /// `some`.
-bool rests_on_the_rest(const CheckedInformation& all, const CheckedInformation& some) {
+bool rests_on_others(const CheckedInformation& all, const CheckedInformation& some) {
     constexpr double kMax = 0.75;
     const Observability& o = all.observability;
     if (o.unobserved == 6 || some.observability.unobserved > o.unobserved) return o.unobserved < 6;
@@ -100,7 +100,8 @@ Status check_start(const Rigid3& T) {
 }  // namespace
 
 /// Sets covariance, bound and root information. `information`: that of the points the answer may rest on.
-void CloudIcp::weigh(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const {
+void CloudIcp::set_covariance(const PlaneEquations& equations, const Matrix6& information,
+                              CloudEstimate& out) const {
     const double factor = equations.variance_factor();
     const Observability& o = out.observability;
     PoseShifts by_model = PoseShifts::Zero(6, 0);
@@ -113,7 +114,7 @@ void CloudIcp::weigh(const PlaneEquations& equations, const Matrix6& information
 }
 
 /// The answer may rest only on points that are checked by others and cannot lie on another surface.
-void CloudIcp::verify(CloudEstimate& out) {
+void CloudIcp::leave_out_unchecked_points(CloudEstimate& out) {
     const Rigid3& T = out.T_lidar_target;
     association_.set_scale(1 + out.scale);
     association_.find_edges(T, settings_.noise);
@@ -125,10 +126,10 @@ void CloudIcp::verify(CloudEstimate& out) {
         row.checked = !association_.may_be_on_other_surface(T, settings_.noise, radius_m, row.measurement,
                                                             planes_[row.measurement]);
     const CheckedInformation on_one = checked_information(rows_, equations->spread(), kUnobservedBelow);
-    if (rests_on_the_rest(checked, on_one)) checked = on_one;
+    if (rests_on_others(checked, on_one)) checked = on_one;
     out.unchecked = checked.unchecked;
     out.observability = checked.observability;
-    weigh(*equations, checked.information, out);
+    set_covariance(*equations, checked.information, out);
 }
 
 std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride,
@@ -177,11 +178,11 @@ std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search
     return equations;
 }
 
-Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points, int circles, CloudEstimate& out) {
+Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points, int radii, CloudEstimate& out) {
     const std::size_t stride = std::max<std::size_t>(1, association_.size() / points);
-    const double narrower = std::pow(kLastCircle, 1.0 / (circles - 1));
+    const double narrower = std::pow(kLastRadius, 1.0 / (radii - 1));
     Rigid3 T = start;
-    for (int i = 0; i < circles; ++i, search_m *= narrower) {
+    for (int i = 0; i < radii; ++i, search_m *= narrower) {
         const auto equations = linearise(T, search_m, stride, out);
         if (!equations) break;
         T = displaced(T, equations->pose_step(out.observability));
@@ -190,10 +191,10 @@ Rigid3 CloudIcp::search(const Rigid3& start, double search_m, std::size_t points
     return T;
 }
 
-CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_t points, int circles) {
+CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_t points, int radii) {
     CloudEstimate out;
     Rigid3& T = out.T_lidar_target;
-    T = search_m > 0 ? search(start, search_m, points, circles, out) : start;
+    T = search_m > 0 ? search(start, search_m, points, radii, out) : start;
     Vector6 last = Vector6::Zero();
     double damping = 1, moved_m = 0;  // moved_m: motion since edges were found
     for (int i = 0;; ++i) {
@@ -206,7 +207,7 @@ CloudEstimate CloudIcp::attempt(const Rigid3& start, double search_m, std::size_
         const auto equations = linearise(T, 0, 1, out);
         if (!equations) break;
         if (out.settled || i == settings_.iterations) {
-            weigh(*equations, equations->information(), out);
+            set_covariance(*equations, equations->information(), out);
             break;
         }
         auto [step, larger] = equations->step(out.observability);
@@ -237,7 +238,7 @@ void CloudIcp::refit_missed_beams(CloudEstimate& found) {
     for (int i = 0; i < 3; ++i) {
         if (found.used < kFewestBeams || found.explained + found.grazing + found.edges >= found.points) return;
         CloudEstimate again =
-            attempt(found.T_lidar_target, kBesideCircle * found.radius_m, 4 * kSearchPoints, kSearchIterations);
+            attempt(found.T_lidar_target, kRefitRadius * found.radius_m, 4 * kSearchPoints, kSearchIterations);
         again.iterations += found.iterations;
         if (!(again.settled && again.cost < found.cost - kBetter)) return;
         found = again;
@@ -251,15 +252,15 @@ bool CloudIcp::may_have_rivals(const CloudEstimate& e) {
     const auto elsewhere = static_cast<double>(e.points - e.explained - e.grazing - e.edges);
     // Half of a chi-square; its standard deviation is the square root of its mean.
     const double of_noise = 0.5 * static_cast<double>(e.points - e.edges);
-    return e.used < kManyPoints || o.eigenvalues[o.unobserved] < kWeak ||
-           elsewhere > kFewElsewhere * static_cast<double>(e.points) ||
+    return e.used < kManyPoints || o.eigenvalues[o.unobserved] < kWeakEigenvalue ||
+           elsewhere > kPartElsewhereMax * static_cast<double>(e.points) ||
            e.cost > of_noise + kMoreThanNoise_sigmas * std::sqrt(of_noise);
 }
 
 /// Looks for equally good minima, starting at poses one search radius away along the two least observed motions.
 /// Keeps the best; another that is nearly as likely becomes a rival. True if a better one was found: the caller
 /// then repeats this about it, as still better ones may exist.
-bool CloudIcp::compete(CloudEstimate& found, double search_m) {
+bool CloudIcp::search_rivals(CloudEstimate& found, double search_m) {
     if (found.used < kFewestBeams || found.observability.unobserved > 4 || !may_have_rivals(found)) return false;
     const CloudEstimate first = found;
     for (const int motion : {first.observability.unobserved, first.observability.unobserved + 1})
@@ -361,14 +362,14 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
     }
     refit_missed_beams(out);
     if (search_m > 0)
-        for (int k = 0; k < kCompetitions && compete(out, search_m); ++k) {
+        for (int k = 0; k < kRivalSearchesMax && search_rivals(out, search_m); ++k) {
         }
     if (out.used < kFewestBeams)
         return Error{.what = "only " + std::to_string(out.used) + " of " + std::to_string(points.size()) +
                              " beams meet the target where it is taken to be, expected at least " +
                              std::to_string(kFewestBeams),
                      .kind = ErrorKind::failed};
-    verify(out);
+    leave_out_unchecked_points(out);
     out.empty_beams = empty_beams_.count(out.T_lidar_target, out.covariance);
     out.answer = answer_of(out, start, search_m);
     return out;

@@ -16,9 +16,9 @@
 #include "estimator/cloud/beam_association.h"
 #include "estimator/cloud/empty_beams.h"
 #include "estimator/cloud/plane_equations.h"
-#include "estimator/pose/answer.h"
-#include "estimator/pose/leverage.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/leverage.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 
 namespace narpa {
 
@@ -100,17 +100,17 @@ public:
 
 private:
     [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start, double search_m) const;
-    void weigh(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const;
-    void verify(CloudEstimate& out);
+    void set_covariance(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const;
+    void leave_out_unchecked_points(CloudEstimate& out);
     /// Normal equations at this pose; empty if too few points meet the model.
     [[nodiscard]] std::optional<PlaneEquations> linearise(const Rigid3& T, double search_m, std::size_t stride,
                                                           CloudEstimate& out);
-    [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int circles);
+    [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int radii);
     [[nodiscard]] double edges_hold_m() const;
     void refit_missed_beams(CloudEstimate& found);
     [[nodiscard]] static bool may_have_rivals(const CloudEstimate& e);
-    bool compete(CloudEstimate& found, double search_m);
-    [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int circles,
+    bool search_rivals(CloudEstimate& found, double search_m);
+    [[nodiscard]] Rigid3 search(const Rigid3& start, double search_m, std::size_t points, int radii,
                                 CloudEstimate& out);
 
     IcpSettings settings_;

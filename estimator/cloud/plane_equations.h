@@ -3,10 +3,10 @@
 
 #include <cstddef>
 
-#include "estimator/pose/leverage.h"
-#include "estimator/pose/model_uncertainty.h"
-#include "estimator/pose/observability.h"
 #include "estimator/pose/pose_estimate.h"
+#include "estimator/uncertainty/leverage.h"
+#include "estimator/uncertainty/model_uncertainty.h"
+#include "estimator/uncertainty/observability.h"
 
 namespace narpa {
 

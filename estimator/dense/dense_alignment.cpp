@@ -1,6 +1,7 @@
 #include "estimator/dense/dense_alignment.h"
 
 #include <fmt/format.h>
+#include <cassert>
 
 #include <algorithm>
 #include <array>
@@ -11,34 +12,14 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/dense/dense_tuning.h"
 #include "estimator/dense/level_solver.h"
 
 namespace narpa {
+
+using namespace dense_tuning;
+
 namespace {
-
-/// Two answers agree if their squared Mahalanobis distance is below this: five sigma.
-constexpr double kAgree = 25;
-/// The coarsest level shows the target no smaller than this.
-constexpr double kMinExtent_px = 16;
-
-/// A motion is weak if its standard deviation exceeds this part of the limit of observed motions: the image may not
-/// be linear over it.
-constexpr double kSurelyLinear = 0.2;
-/// Test of linearity along the `motions` least observed motions. At `sigmas` standard deviations the loss must rise
-/// by at least the part `least` of a linear image's (smaller further away, where a robust loss rises less). It must
-/// rise by less than in a valley that bends by one standard deviation of another motion over one of this motion.
-struct Linear {
-    int motions;
-    double sigmas, least;
-    [[nodiscard]] bool allows(const LevelSolver::Rise& rise) const {
-        return rise.least > least && rise.most < 1 + sigmas * sigmas;
-    }
-};
-constexpr std::array kLinear{Linear{1, 4, 0.5}, Linear{3, 8, 0.35}};
-/// An answer rotated by more than this from the guess is tested with a third start.
-constexpr double kFarTurn_rad = 0.07;
-/// Other minima are searched from starts at this distance.
-constexpr double kAside_sigmas = 8;
 
 /// Makes the pose with the smaller loss the answer.
 void keep_better(DenseEstimate& answer, DenseEstimate& other) {
@@ -46,7 +27,7 @@ void keep_better(DenseEstimate& answer, DenseEstimate& other) {
     if (other.excess_loss < answer.excess_loss) std::swap(answer, other);
 }
 
-/// One standard deviation of each of the two least observed motions, if it is weak (kSurelyLinear).
+/// One standard deviation of each of the two least observed motions, if it is weak (kWeakMotion).
 std::vector<Vector6> weak_motions(const DenseEstimate& e) {
     constexpr int kMax = 2;
     const Observability o = observability_of(e.covariance_of_image(), norm(e.T_camera_body.t));
@@ -54,7 +35,7 @@ std::vector<Vector6> weak_motions(const DenseEstimate& e) {
     for (int i = 0; i < kMax; ++i) {
         const Vector6 motion = o.motions.col(i) / std::sqrt(o.eigenvalues[i]);
         if (std::max(motion.head<3>().norm() / kMaxRotation_rad,
-                     motion.tail<3>().norm() / (kMaxTranslation * norm(e.T_camera_body.t))) > kSurelyLinear)
+                     motion.tail<3>().norm() / (kMaxTranslation * norm(e.T_camera_body.t))) > kWeakMotion)
             out.push_back(motion);
     }
     return out;
@@ -71,11 +52,12 @@ Quat other_tilt(const Vec3& normal, const Vec3& position_m) {
 /// Factor of a descent's first level: the coarsest that shows enough of a target of this extent.
 int first_level(const DenseOptions& options, double target_px) {
     int factor = options.coarsest;
-    while (factor > options.finest && target_px / factor < kMinExtent_px) factor /= 2;
+    while (factor > options.finest && target_px / factor < kExtentMin_px) factor /= 2;
     return factor;
 }
 
 std::size_t level_number(int factor) {
+    assert(factor > 0 && std::has_single_bit(static_cast<unsigned>(factor)));
     return static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)));
 }
 
@@ -121,31 +103,28 @@ Status DenseAlignment::check(const MeasuredImage& frame, std::span<const float> 
     return Ok{};
 }
 
-LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
-                                 const DenseOptions& options, const MeasuredImage& frame,
-                                 std::span<const float> frame_variance) {
+LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window& window, const Measured& m,
+                                 const DenseOptions& options) {
     const std::size_t number = level_number(factor);
     auto& kept = levels_[number];
     if (!kept || kept->window() != window)
-        kept.emplace(render_scene_, camera, sensor_, static_cast<double>(factor) * factor, window, target_, at);
+        kept.emplace(render_scene_, camera, sensor_, static_cast<double>(factor) * factor, window, target_, m.at);
     else if (hold_frame_[number])
         return *kept;
     hold_frame_[number] = true;
-    kept->begin_frame(at, options.motion, times_.scaled(factor), options.model, options.T_world_camera);
-    kept->measure(coarser_image(frame, factor), coarser_variance(frame_variance, camera_, factor));
+    kept->begin_frame(m.at, options.motion, times_.scaled(factor), options.model, options.T_world_camera);
+    kept->measure(coarser_image(m.frame, factor), coarser_variance(m.variance, camera_, factor));
     return *kept;
 }
 
-void DenseAlignment::evaluate_losses_on_common_pixels(const MeasuredImage& frame, const BodyPoses& at,
-                                                      const DenseOptions& options,
-                                                      std::span<const float> frame_variance, DenseEstimate& a,
-                                                      DenseEstimate& b) {
+void DenseAlignment::evaluate_losses_on_common_pixels(const Measured& m, const DenseOptions& options,
+                                                      DenseEstimate& a, DenseEstimate& b) {
     if (a.window == b.window) return;
     const Camera camera = coarser_camera(camera_, options.finest);
     const Window both = joined(a.window, b.window);
-    LevelView& view = level(options.finest, camera, both, at, options, frame, frame_variance);
+    LevelView& view = level(options.finest, camera, both, m, options);
     for (DenseEstimate* e : {&a, &b})
-        LevelSolver(camera, render_scene_, target_, options.finest, view, options, *e).weigh();
+        LevelSolver(camera, render_scene_, target_, options.finest, view, options, *e).evaluate_loss();
 }
 
 Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const BodyPoses& at,
@@ -153,19 +132,20 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
                                             std::span<const float> frame_variance) {
     if (auto good = check(frame, frame_variance, at, T_camera_body_guess); !good) return good.error();
     hold_frame_.fill(false);
-    DenseEstimate e = descend(frame, at, T_camera_body_guess, options, frame_variance, options.finest);
+    const Measured m{frame, at, frame_variance};
+    DenseEstimate e = descend(m, T_camera_body_guess, options, options.finest);
     Fit fit;
     if (e.status == DenseStatus::converged && options.rivals > 0)
-        compete(frame, at, T_camera_body_guess, options, frame_variance, e, fit);
+        test_by_mirrored_starts(m, T_camera_body_guess, options, e, fit);
     if (e.status == DenseStatus::converged && options.rivals > 0 && fit.failed.empty() && !weak_motions(e).empty())
-        examine(frame, at, options, frame_variance, e, fit);
+        test_weak_motions(m, options, e, fit);
     if (e.status == DenseStatus::converged) {
         observe(e.T_camera_body, e.covariance, fit);
         compare_with_guess(e.T_camera_body, T_camera_body_guess, fit);
         fit.guess_error = options.guess_error;
         const bool known = !frame_variance.empty() && options.model == ModelUncertainty{};
         fit.residual = e.residual;
-        fit.residual_max = known ? options.residual_max : options.residual_most_unknown;
+        fit.residual_max = known ? options.residual_max : options.residual_max_noise_unknown;
         if (known && has_independent_noise() && std::abs(e.blur) > options.blur_max && fit.failed.empty())
             fit.failed =
                 fmt::format("{} blurred than the model, by {:.3g} standard deviations, expected at most {:g}",
@@ -189,31 +169,29 @@ bool DenseAlignment::has_independent_noise() const {
 /// One of the mirrored starts must lead to the answer, or to a pose that is as likely. Its coarse levels suffice if
 /// one step from their result leads to the answer. If the first start leads elsewhere, the answer is the pose with
 /// the smaller loss, and two of the three starts (with the guess) must lead to it.
-void DenseAlignment::compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
-                             const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e,
-                             Fit& fit) {
+void DenseAlignment::test_by_mirrored_starts(const Measured& m, const Rigid3& guess, const DenseOptions& options,
+                                             DenseEstimate& e, Fit& fit) {
     fit.failed = "no second start leads to the same pose";
     for (int k = 0; k < options.rivals && !fit.failed.empty(); ++k) {
         const Vector6 beyond = std::pow(0.5, k) * error_between(guess, e.T_camera_body);
-        DenseEstimate other =
-            descend(frame, at, displaced(e.T_camera_body, beyond), options, frame_variance, 2 * options.finest);
+        DenseEstimate other = descend(m, displaced(e.T_camera_body, beyond), options, 2 * options.finest);
         e.renders += other.renders;
         if (other.status == DenseStatus::left_the_picture) continue;
-        if (meets(e, other, options))
+        if (converges_to(e, other, options))
             fit.failed.clear();
         else
-            compare_to_the_end(frame, at, options, frame_variance, other.T_camera_body, e, fit);
+            descend_and_compare(m, options, other.T_camera_body, e, fit);
     }
-    if (fit.failed.empty() && fit.rivals.empty()) start_near(frame, at, guess, options, frame_variance, e, fit);
+    if (fit.failed.empty() && fit.rivals.empty()) test_by_start_near(m, guess, options, e, fit);
 }
 
 /// True if steps from the other's coarse result lead to the answer. Adds the variance of the two to the covariance.
-bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options) {
+bool DenseAlignment::converges_to(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options) {
     other.exposure = e.exposure, other.renders = 0;
     const Camera camera = coarser_camera(camera_, options.finest);
     LevelView& finest = *levels_[level_number(options.finest)];
     LevelSolver solver(camera, render_scene_, target_, options.finest, finest, options, other);
-    const auto apart = solver.miss(e.T_camera_body);
+    const auto apart = solver.distance_after_steps_to(e.T_camera_body);
     e.renders += other.renders;
     if (apart) e.covariance += 0.5 * *apart * apart->transpose();
     return apart.has_value();
@@ -221,19 +199,18 @@ bool DenseAlignment::meets(DenseEstimate& e, DenseEstimate& other, const DenseOp
 
 /// Descends from `start` to the finest level and keeps the pose with the smaller loss. No change if that finds no
 /// pose.
-void DenseAlignment::compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at,
-                                        const DenseOptions& options, std::span<const float> frame_variance,
-                                        const Rigid3& start, DenseEstimate& e, Fit& fit) {
-    DenseOptions to_the_end = options;
-    to_the_end.coarsest = options.finest;
-    DenseEstimate other = descend(frame, at, start, to_the_end, frame_variance, options.finest);
+void DenseAlignment::descend_and_compare(const Measured& m, const DenseOptions& options, const Rigid3& start,
+                                         DenseEstimate& e, Fit& fit) {
+    DenseOptions to_finest = options;
+    to_finest.coarsest = options.finest;
+    DenseEstimate other = descend(m, start, to_finest, options.finest);
     e.renders += other.renders;
     if (other.status != DenseStatus::converged) return;
-    evaluate_losses_on_common_pixels(frame, at, options, frame_variance, e, other);
+    evaluate_losses_on_common_pixels(m, options, e, other);
     keep_better(e, other);
     const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
     const double worse = other.excess_loss - e.excess_loss;
-    const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree;
+    const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree_chi2;
     fit.failed = agree || worse < kRival_chi2 ? "" : "two starts lead to different poses";
     if (agree)
         e.covariance += 0.5 * apart * apart.transpose();
@@ -243,45 +220,42 @@ void DenseAlignment::compare_to_the_end(const MeasuredImage& frame, const BodyPo
 
 /// The coarsest levels may lead both starts away from a pose near the guess, to the same false minimum. So if the
 /// answer is far from the guess, a third start skips them. Its pose counts only if its loss is smaller.
-void DenseAlignment::start_near(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
-                                const DenseOptions& options, std::span<const float> frame_variance,
-                                DenseEstimate& e, Fit& fit) {
+void DenseAlignment::test_by_start_near(const Measured& m, const Rigid3& guess, const DenseOptions& options,
+                                        DenseEstimate& e, Fit& fit) {
     DenseOptions without = options;
     without.coarsest = 2 * options.finest;
     const auto window = window_about(render_scene_.tracer(), camera_, target_, guess);
     if (!window || first_level(options, extent_px(*window)) <= without.coarsest ||
-        error_between(guess, e.T_camera_body).head<3>().norm() < kFarTurn_rad)
+        error_between(guess, e.T_camera_body).head<3>().norm() < kThirdStart_rad)
         return;
-    DenseEstimate other = descend(frame, at, guess, without, frame_variance, without.coarsest);
+    DenseEstimate other = descend(m, guess, without, without.coarsest);
     e.renders += other.renders;
-    if (other.status == DenseStatus::left_the_picture || meets(e, other, options)) return;
+    if (other.status == DenseStatus::left_the_picture || converges_to(e, other, options)) return;
     const Camera camera = coarser_camera(camera_, without.coarsest);
     LevelView& view = *levels_[level_number(without.coarsest)];
     DenseEstimate here = e, there = other;
     there.exposure = e.exposure;
     for (DenseEstimate* x : {&here, &there})
-        LevelSolver(camera, render_scene_, target_, without.coarsest, view, options, *x).weigh();
+        LevelSolver(camera, render_scene_, target_, without.coarsest, view, options, *x).evaluate_loss();
     e.renders += 2;
-    if (there.excess_loss < here.excess_loss)
-        compare_to_the_end(frame, at, options, frame_variance, other.T_camera_body, e, fit);
+    if (there.excess_loss < here.excess_loss) descend_and_compare(m, options, other.T_camera_body, e, fit);
 }
 
 /// Tests what the covariance of a weak motion does not include: other minima along it; a flat face tilted to the
 /// other side of the line of sight; an image that is not linear in the pose over a few standard deviations. If all
 /// motions count as observed, at least one of these descents must converge: else nothing was tested.
-void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
-                             std::span<const float> frame_variance, DenseEstimate& e, Fit& fit) {
+void DenseAlignment::test_weak_motions(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit) {
     const Camera camera = coarser_camera(camera_, options.finest);
     const auto view_of_answer = [&]() -> LevelView& {
         const auto window = window_about(render_scene_.tracer(), camera, target_, e.T_camera_body);
-        return level(options.finest, camera, *window, at, options, frame, frame_variance);
+        return level(options.finest, camera, *window, m, options);
     };
     std::vector<Rigid3> starts;
     for (const Vector6& motion : weak_motions(e))
-        for (const double sigmas : {kAside_sigmas, -kAside_sigmas})
+        for (const double sigmas : {kSearchedBeside_sigmas, -kSearchedBeside_sigmas})
             starts.push_back(displaced(e.T_camera_body, sigmas * motion));
     LevelView& view = view_of_answer();
-    LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).examine();
+    LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).linearise_with_many_samples();
     if (const auto face = view.flat_face())
         starts.push_back({other_tilt(*face, e.T_camera_body.t) * e.T_camera_body.q, e.T_camera_body.t});
     std::vector<DenseEstimate> minima{e};
@@ -293,11 +267,11 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
     from_near.coarsest = std::min(options.coarsest, 2 * options.finest);
     bool tested = false;
     for (const Rigid3& start : starts) {
-        DenseEstimate other = descend(frame, at, start, from_near, frame_variance, options.finest);
+        DenseEstimate other = descend(m, start, from_near, options.finest);
         e.renders += other.renders;
         if (other.status != DenseStatus::converged) continue;
         tested = true;
-        evaluate_losses_on_common_pixels(frame, at, options, frame_variance, e, other);
+        evaluate_losses_on_common_pixels(m, options, e, other);
         minima.push_back(other);
         keep_better(e, other);
     }
@@ -306,20 +280,20 @@ void DenseAlignment::examine(const MeasuredImage& frame, const BodyPoses& at, co
     for (DenseEstimate& other : minima) {
         const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
         if (!(normalised_error_squared(apart, e.covariance) > kDistinctPose_chi2)) continue;
-        evaluate_losses_on_common_pixels(frame, at, options, frame_variance, e, other);
+        evaluate_losses_on_common_pixels(m, options, e, other);
         const double worse = other.excess_loss - e.excess_loss;
         if (worse < kRival_chi2) fit.rivals.push_back({other.T_camera_body, worse});
     }
     LevelSolver solver(camera, render_scene_, target_, options.finest, view_of_answer(), options, e);
-    solver.examine();
-    for (const Linear& linear : kLinear)
-        if (!linear.allows(solver.rise(linear.motions, linear.sigmas)))
+    solver.linearise_with_many_samples();
+    for (const LinearityTest& test : kLinearityTests)
+        if (const auto rise = solver.rise(test.motions, test.sigmas);
+            !(rise.min > test.rise_min && rise.max < test.rise_max()))
             fit.failed =
-                fmt::format("the image is not linear in the pose over {:g} standard deviations", linear.sigmas);
+                fmt::format("the image is not linear in the pose over {:g} standard deviations", test.sigmas);
 }
 
-DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
-                                      const DenseOptions& options, std::span<const float> frame_variance,
+DenseEstimate DenseAlignment::descend(const Measured& m, const Rigid3& guess, const DenseOptions& options,
                                       int last) {
     DenseEstimate e;
     e.T_camera_body = guess;
@@ -340,11 +314,11 @@ DenseEstimate DenseAlignment::descend(const MeasuredImage& frame, const BodyPose
         }
         // The first level uses the whole image, as the guess may be far off.
         if (first && factor > 1) window = Window{0, 0, camera.width, camera.height};
-        LevelView& view = level(factor, camera, *window, at, options, frame, frame_variance);
+        LevelView& view = level(factor, camera, *window, m, options);
         LevelSolver solver(camera, render_scene_, target_, factor, view, options, e);
         e.status = solver.run(first);
         if (factor != options.finest || e.status != DenseStatus::converged) continue;
-        solver.polish();
+        solver.refine_with_many_samples();
         solver.finish();
     }
     return e;
@@ -360,7 +334,7 @@ Result<Matrix6> DenseAlignment::bound(const BodyPoses& at, const Rigid3& T_camer
     const std::optional<Window> window = window_about(render_scene_.tracer(), camera, target_, T_camera_body);
     if (!window) return Error{"the target is not in the image"};
     hold_frame_.fill(false);
-    LevelView& view = level(options.finest, camera, *window, at, options, none, frame_variance);
+    LevelView& view = level(options.finest, camera, *window, {none, at, frame_variance}, options);
     DenseEstimate e;
     e.T_camera_body = T_camera_body;
     return LevelSolver(camera, render_scene_, target_, options.finest, view, options, e).bound();

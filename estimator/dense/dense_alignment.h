@@ -19,8 +19,8 @@
 
 #include "base/result.h"
 #include "estimator/dense/level_view.h"
-#include "estimator/pose/answer.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 
 namespace narpa {
 
@@ -49,7 +49,7 @@ struct DenseOptions {
     int rivals = 2;
     /// Largest accepted residual (DenseEstimate::residual): of frames whose noise is known, that is,
     /// `frame_variance` is given and the model is exact; and of others.
-    double residual_max = 1.15, residual_most_unknown = 6;
+    double residual_max = 1.15, residual_max_noise_unknown = 6;
     /// Largest accepted blur beyond the model's (DenseEstimate::blur), if the noise is known and independent
     /// between pixels: chance exceeds it in 6 of 10^5 frames.
     double blur_max = 4;
@@ -118,27 +118,29 @@ public:
                                         const DenseOptions& options, std::span<const float> frame_variance = {});
 
 private:
+    /// What align() was given.
+    struct Measured {
+        const MeasuredImage& frame;
+        const BodyPoses& at;
+        std::span<const float> variance;
+    };
     /// `last`: factor of the last level; if coarser than the finest, only the pose is computed.
-    [[nodiscard]] DenseEstimate descend(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
-                                        const DenseOptions& options, std::span<const float> frame_variance,
+    [[nodiscard]] DenseEstimate descend(const Measured& m, const Rigid3& guess, const DenseOptions& options,
                                         int last);
     [[nodiscard]] bool has_independent_noise() const;
-    void compete(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess, const DenseOptions& options,
-                 std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
-    [[nodiscard]] bool meets(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options);
-    void compare_to_the_end(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
-                            std::span<const float> frame_variance, const Rigid3& start, DenseEstimate& e, Fit& fit);
-    void start_near(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
-                    const DenseOptions& options, std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
-    void examine(const MeasuredImage& frame, const BodyPoses& at, const DenseOptions& options,
-                 std::span<const float> frame_variance, DenseEstimate& e, Fit& fit);
+    void test_by_mirrored_starts(const Measured& m, const Rigid3& guess, const DenseOptions& options,
+                                 DenseEstimate& e, Fit& fit);
+    [[nodiscard]] bool converges_to(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options);
+    void descend_and_compare(const Measured& m, const DenseOptions& options, const Rigid3& start, DenseEstimate& e,
+                             Fit& fit);
+    void test_by_start_near(const Measured& m, const Rigid3& guess, const DenseOptions& options, DenseEstimate& e,
+                            Fit& fit);
+    void test_weak_motions(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit);
     /// Evaluates both losses over the same pixels: those about either pose.
-    void evaluate_losses_on_common_pixels(const MeasuredImage& frame, const BodyPoses& at,
-                                          const DenseOptions& options, std::span<const float> frame_variance,
-                                          DenseEstimate& a, DenseEstimate& b);
-    LevelView& level(int factor, const Camera& camera, const Window& window, const BodyPoses& at,
-                     const DenseOptions& options, const MeasuredImage& frame,
-                     std::span<const float> frame_variance);
+    void evaluate_losses_on_common_pixels(const Measured& m, const DenseOptions& options, DenseEstimate& a,
+                                          DenseEstimate& b);
+    LevelView& level(int factor, const Camera& camera, const Window& window, const Measured& m,
+                     const DenseOptions& options);
 
     const RenderScene& render_scene_;
     Camera camera_;

@@ -4,33 +4,19 @@
 #include <limits>
 #include <vector>
 
+#include "estimator/dense/dense_tuning.h"
 #include "estimator/dense/level_solver.h"
-#include "estimator/pose/response.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/response.h"
 
 namespace narpa {
-namespace {
-
-/// The model does not fit if residuals are more than this many times their noise,
-constexpr double kNoFit = 4;
-/// or the gain is off its prior by more than kPriorHolds standard deviations plus kMinOff,
-constexpr double kPriorHolds = 4, kMinOff = 1e-3;
-/// or the loss exceeds that of noise by more than this per pixel: station and cube in clean and saturated frames:
-/// 8.
-constexpr double kMaxMisfit = 10;
-/// The weakest motions are rendered to both sides: by kRendered_sigmas standard deviations, at most
-/// kRendered_limits times the limit of observed motions, at least kRendered_px pixels.
-constexpr double kRendered_sigmas = 2, kRendered_limits = 2, kRendered_px = 0.2;
-/// Upper limit of the measured response to a motion over the Jacobian's: larger ones made covariances too small.
-constexpr double kMaxShown = 1.3;
-
-}  // namespace
+using namespace dense_tuning;
 
 void LevelSolver::finish() {
     const PhotometricImages images = view_.images();
     const PhotometricEquations last = equations(images, e_.exposure, robust_);
     // The remaining step is part of the error.
-    const Vector6 to_go = ldlt_solve(last.pose_information(), last.pose_gradient());
+    const Vector6 remaining_step = ldlt_solve(last.pose_information(), last.pose_gradient());
     const Matrix6 of_noise = last.pose_covariance();
     e_.covariance_of_model = covariance_of_model(last);
     const PhotometricCost now = cost(images, e_.exposure, robust_);
@@ -49,11 +35,12 @@ void LevelSolver::finish() {
     e_.residual =
         std::max(of_information, std::sqrt(loss.chi2 / static_cast<double>(std::max<std::size_t>(loss.pixels, 1))));
     const double off = std::abs(e_.exposure.gain - 1);
-    if (robust_.scale > kNoFit || e_.misfit > kMaxMisfit || off > kPriorHolds * images.prior.gain_sigma + kMinOff)
+    if (robust_.scale > kResidualMax || e_.misfit > kMisfitMax ||
+        off > kPriorSigmas * images.prior.gain_sigma + kGainOffMin)
         e_.status = DenseStatus::does_not_fit;
     else
-        e_.covariance = covariance_by_response(of_noise, response_to_motions(last), kMaxShown) +
-                        e_.covariance_of_model + to_go * to_go.transpose();
+        e_.covariance = covariance_by_response(of_noise, response_to_motions(last), kResponseMax) +
+                        e_.covariance_of_model + remaining_step * remaining_step.transpose();
 }
 
 /// Measures the response by central differences of renders with equal samples.
@@ -66,7 +53,7 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     settings_.spp = std::max(2, o_.samples_per_pixel);
     std::vector<float> change(signal.size());
     return response_to_weakest(o, [&](int i, const Vector6& motion) {
-        const double within_limits = kRendered_limits * std::sqrt(o.eigenvalues[i]);
+        const double within_limits = kRenderedLimits * std::sqrt(o.eigenvalues[i]);
         const double sigmas =
             std::max(std::min(kRendered_sigmas, within_limits), kRendered_px / distance_px(motion));
         render(displaced(e_.T_camera_body, sigmas * motion));
@@ -88,8 +75,9 @@ LevelSolver::Rise LevelSolver::rise(int motions, double sigmas) {
             const Eigen::Vector2d step = equations_.exposure_step(motion);
             const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
             render(displaced(e_.T_camera_body, motion));
-            const double rises = (cost(view_.images(), exposure, {}).robust - examined_loss_) / (sigmas * sigmas);
-            rise = {std::min(rise.least, rises), std::max(rise.most, rises)};
+            const double rises =
+                (cost(view_.images(), exposure, {}).robust - loss_when_linearised_) / (sigmas * sigmas);
+            rise = {std::min(rise.min, rises), std::max(rise.max, rises)};
         }
     return rise;
 }

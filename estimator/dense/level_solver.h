@@ -1,4 +1,7 @@
 /// estimator/dense/level_solver.h - Levenberg-Marquardt on one pyramid level of one frame.
+///
+/// Its steps are those of levenberg_marquardt.h, but not its loop: each cost is that of a new render with sampling
+/// noise, so short steps are accepted without a test, and pixels are chosen and Jacobians replaced between steps.
 #pragma once
 
 #include "estimator/dense/dense_alignment.h"
@@ -25,23 +28,23 @@ public:
     /// than the Jacobian is valid for.
     DenseStatus run(bool first);
     /// One more step with many more rays, against the sampling noise of the rendered image.
-    void polish();
+    void refine_with_many_samples();
     /// Covariance, residuals and status at the last rendered pose. Leaves another pose rendered.
     void finish();
     /// Evaluates the loss at the estimate's pose again, over this view's pixels.
-    void weigh();
+    void evaluate_loss();
     /// Remaining distance to the other pose after steps from the estimate's; empty if they do not lead there or
     /// most of the way, or if the distance exceeds the Jacobian's validity. Computes a Jacobian if the view has
     /// none there.
-    [[nodiscard]] std::optional<Vector6> miss(const Rigid3& T_camera_body);
+    [[nodiscard]] std::optional<Vector6> distance_after_steps_to(const Rigid3& T_camera_body);
     /// Renders with as many samples as the last step and linearises at the estimate's pose.
-    void examine();
+    void linearise_with_many_samples();
     struct Rise {
-        double least, most;
+        double min, max;
     };
-    /// After examine(): smallest and largest rise of the loss along the `motions` least observed motions, at this
-    /// many standard deviations to both sides, over that of a linear image. About one if the image is linear so
-    /// far.
+    /// After linearise_with_many_samples(): smallest and largest rise of the loss along the `motions` least
+    /// observed motions, at this many standard deviations to both sides, over that of a linear image. About one if
+    /// the image is linear so far.
     [[nodiscard]] Rise rise(int motions, double sigmas);
     /// The bound of DenseAlignment::bound, at the estimate.
     Result<Matrix6> bound();
@@ -93,8 +96,8 @@ private:
     PhotometricCost cost_{};
     PhotometricEquations equations_{};
     Vector6 last_step_ = Vector6::Zero();
-    double stride_ = 1;         ///< factor of the step length
-    double examined_loss_ = 0;  ///< of examine()
+    double stride_ = 1;                ///< factor of the step length
+    double loss_when_linearised_ = 0;  ///< of linearise_with_many_samples()
 };
 
 }  // namespace narpa

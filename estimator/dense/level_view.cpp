@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -109,6 +110,8 @@ void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, c
 }
 
 void LevelView::measure(const MeasuredImage& image, std::span<const float> variance) {
+    assert(window_.x + window_.width <= image.width && window_.y + window_.height <= image.height);
+    assert(variance.empty() || variance.size() == image.dn.size());
     measured_variance_.resize(variance.empty() ? 0 : measured_.size());
     measured_clipped_.resize(image.clipped.empty() ? 0 : measured_.size());
     std::size_t to = 0;
@@ -161,6 +164,7 @@ void LevelView::predict(const Vector6& step) {
 }
 
 void LevelView::choose(std::vector<std::uint8_t> pixels) {
+    assert(pixels.size() == signal_.size());
     chosen_ = std::move(pixels);
     for (std::size_t i = 0; i < columns_.size(); ++i)
         if (chosen_[i] == 0) columns_[i].setZero();

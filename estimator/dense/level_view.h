@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimator/dense/photometric_fit.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "estimator/view/model_view.h"
 
 namespace narpa {

@@ -1,6 +1,7 @@
 #include "estimator/dense/photometric_fit.h"
 
 #include <tbb/parallel_for.h>
+#include <cassert>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -10,17 +11,17 @@
 #include <numeric>
 #include <vector>
 
-#include "estimator/pose/median.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/median.h"
+#include "estimator/least_squares/symmetric.h"
 
 namespace narpa {
 namespace {
 
 /// Precision of an exact prior.
-constexpr double kSure = 1e12;
+constexpr double kExactPriorPrecision = 1e12;
 
 double precision(double sigma) {
-    return sigma > 0 ? 1 / (sigma * sigma) : kSure;
+    return sigma > 0 ? 1 / (sigma * sigma) : kExactPriorPrecision;
 }
 
 struct Residual {
@@ -32,7 +33,12 @@ struct Residual {
 class Residuals {
 public:
     Residuals(const PhotometricImages& images, const Exposure& exposure, double model_dn2)
-        : i_(images), e_(exposure), model_dn2_(model_dn2) {}
+        : i_(images), e_(exposure), model_dn2_(model_dn2) {
+        [[maybe_unused]] const std::size_t pixels = images.signal.size();
+        assert(pixels == static_cast<std::size_t>(images.width) * static_cast<std::size_t>(images.height));
+        assert(images.measured.empty() || images.measured.size() == pixels);
+        assert(images.derivative.empty() || images.derivative.size() == pixels);
+    }
 
     [[nodiscard]] Residual at(int x, int y) const {
         const auto p =
@@ -343,8 +349,8 @@ Eigen::Vector2d PhotometricEquations::exposure_step(const Vector6& pose_step) co
 }
 
 double PhotometricCost::excess() const {
-    constexpr double kOfNoise = 0.8741;  // mean of 9 ln(1 + r^2 / 9), r normal
-    return robust - kOfNoise * static_cast<double>(all_pixels);
+    constexpr double kLossOfNoise = 0.8741;  // mean of 9 ln(1 + r^2 / 9), r normal
+    return robust - kLossOfNoise * static_cast<double>(all_pixels);
 }
 
 bool PhotometricEquations::observes_pose() const {

@@ -18,7 +18,7 @@ double inverse_range_towards(const RaySample& point, const Vec3& direction) {
     return dot(point.normal, direction) / (point.range_m * dot(point.normal, point.ray_direction));
 }
 
-void halve(Contour& c, int body, double here_m) {
+void halve_interval(Contour& c, int body, double here_m) {
     if (body >= 0 && (body != c.far->body || std::abs(here_m - c.range_m) < std::abs(here_m - c.far->range_m)))
         c.on_near = c.middle(), c.range_m = here_m;
     else
@@ -49,11 +49,11 @@ bool is_contour(const RaySample& a, const RaySample& b) {
 
 EdgePlace edge_between(const RaySample& a, const RaySample& b) {
     const double at_a = 1 / a.range_m, at_b = 1 / b.range_m;
-    const double of_a = at_a - inverse_range_towards(b, a.ray_direction);
-    const double of_b = at_b - inverse_range_towards(a, b.ray_direction);
-    const double along = of_a / (of_a + of_b);
+    const double off_b_at_a = at_a - inverse_range_towards(b, a.ray_direction);
+    const double off_a_at_b = at_b - inverse_range_towards(a, b.ray_direction);
+    const double along = off_b_at_a / (off_b_at_a + off_a_at_b);
     if (!(along > 0 && along < 1)) return {0.5, 2 / (at_a + at_b)};
-    return {along, 1 / (at_a + along * (at_b - of_b - at_a))};
+    return {along, 1 / (at_a + along * (at_b - off_a_at_b - at_a))};
 }
 
 void bisect(const Frame& f, std::span<Contour> contours, int halvings) {
@@ -70,7 +70,7 @@ void bisect(const Frame& f, std::span<Contour> contours, int halvings) {
             }
             aim_through(f, x, y, rays);
             f.tracer.intersect(f.at, rays, f.tracer.all_bodies(), hits);
-            for (std::size_t i = 0; i < batch.size(); ++i) halve(batch[i], hits.body[i], hits.range_m[i]);
+            for (std::size_t i = 0; i < batch.size(); ++i) halve_interval(batch[i], hits.body[i], hits.range_m[i]);
         }
     }
 }

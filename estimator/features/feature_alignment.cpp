@@ -8,15 +8,15 @@
 #include <array>
 #include <cmath>
 
-#include "estimator/pose/median.h"
-#include "estimator/pose/response.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/median.h"
+#include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/response.h"
 
 namespace narpa {
 namespace {
 
 /// A match whose residual exceeds this many times the median is an outlier.
-constexpr double kOutlier = 4;
+constexpr double kOutlier_medians = 4;
 /// A feature is on a smooth surface if rays this far beside it meet the same surface,
 constexpr double kNeighbour_px = 1.5;
 /// off its tangent plane by at most this many pixels' worth of depth: a bend is a corner, a step is an outline.
@@ -25,17 +25,17 @@ constexpr double kStep_px = 6;
 /// With fewer degrees of freedom the residuals do not determine their scatter.
 constexpr double kFewestFreedom = 3;
 /// Steps with a smaller squared Mahalanobis length are noise, as each view selects other features.
-constexpr double kSettledSquared = 9;
+constexpr double kSettled_chi2 = 9;
 /// RMS motion in the image by which the response is measured.
 constexpr double kMoved_px = 2;
 /// With at least this many matches most are of points on the body, and the response is not measured.
-constexpr int kMany = 30;
+constexpr int kManyMatches = 30;
 /// If the matches are nearer to the guess than this (RMS), no second start is needed.
 constexpr double kNear_px = 2 * kMoved_px;
 /// Fewer flows do not determine a motion.
 constexpr std::size_t kFewestFlows = 5;
 /// Answers from two starts with a larger squared Mahalanobis distance are two poses.
-constexpr double kSameSquared = 30;
+constexpr double kSamePose_chi2 = 30;
 /// Views whose light differs from the frame's by more than this part are scaled to it, as optical flow takes any
 /// difference for motion. A match with a ratio above kMaxGain is wrong.
 constexpr double kSameLight = 0.01, kMaxGain = 3;
@@ -78,7 +78,7 @@ Vector6 motion_shown(const ModelMatches& points, const std::vector<Matrix26>& ja
         motion = ldlt_solve(H, gradient);
         std::vector<double> lengths;
         for (const FeatureMatch& m : flows) lengths.push_back((jacobians[m.point] * motion - flow(m)).norm());
-        const double max_px = kOutlier * scale_of(lengths);
+        const double max_px = kOutlier_medians * scale_of(lengths);
         std::erase_if(
             flows, [&](const FeatureMatch& m) { return (jacobians[m.point] * motion - flow(m)).norm() > max_px; });
     }
@@ -256,7 +256,7 @@ void FeatureAlignment::compare_with_mirrored(const MeasuredImage& frame, const B
         return;
     }
     const Vector6 apart = error_between(e.T_camera_target, other.T_camera_target);
-    if (normalised_error_squared(apart, e.covariance + other.covariance) > kSameSquared)
+    if (normalised_error_squared(apart, e.covariance + other.covariance) > kSamePose_chi2)
         fit.rivals.push_back({other.T_camera_target, 0});
     e.covariance += 0.5 * apart * apart.transpose();
 }
@@ -268,9 +268,9 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     if (!e.has_pose())
         fit.failed =
             fmt::format("{} in {} render{}", name(e.status), e.rounds.size(), e.rounds.size() == 1 ? "" : "s");
-    else if (e.floor_px > settings_.floor_most_px)
+    else if (e.floor_px > settings_.floor_max_px)
         fit.failed = fmt::format("matches scatter by {:.3g} px, expected at most {:.3g}", e.floor_px,
-                                 settings_.floor_most_px);
+                                 settings_.floor_max_px);
     else
         compare_with_mirrored(frame, at, guess, motion, e, fit);
     e.covariance_of_model =
@@ -321,7 +321,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         PnpFit fit = solve(Loss::cauchy);
         for (int tries = 0; tries < 2 && fit.ok(); ++tries) {
             const std::vector<double> residuals = points.residuals_px(camera, fit.T_camera_body);
-            const double outlier_px = kOutlier * scale_of(residuals);
+            const double outlier_px = kOutlier_medians * scale_of(residuals);
             std::vector<std::uint8_t> agrees;
             for (const double r : residuals) agrees.push_back(r < outlier_px ? 1 : 0);
             points.keep(agrees);
@@ -357,7 +357,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         estimate.covariance *= points.inflation(camera, fit.T_camera_body, C, estimate.covariance, floor_px);
         estimate.status = FeatureStatus::unsettled;
         if (moved_px < settings_.settled_px ||
-            normalised_error_squared(step, estimate.covariance) < kSettledSquared) {
+            normalised_error_squared(step, estimate.covariance) < kSettled_chi2) {
             estimate.status = FeatureStatus::settled;
             break;
         }
@@ -365,7 +365,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
-    if (estimate.agreeing < kMany)
+    if (estimate.agreeing < kManyMatches)
         estimate.covariance = covariance_by_response(
             estimate.covariance,
             response(points, scale, render_settings, T_of_view, estimate.covariance, floor_px));

@@ -11,9 +11,9 @@
 
 #include "estimator/features/feature_matcher.h"
 #include "estimator/features/model_matches.h"
-#include "estimator/pose/answer.h"
-#include "estimator/pose/model_uncertainty.h"
-#include "estimator/pose/pnp_refine.h"
+#include "estimator/pnp/pnp_refine.h"
+#include "estimator/uncertainty/answer.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "estimator/view/model_view.h"
 
 namespace narpa {
@@ -25,7 +25,7 @@ struct FeatureSettings {
     int spp = 4;               ///< of the views
     int spp_over_time = 16;    ///< the same if rows are exposed over time: each sample sees one moment
     std::uint64_t seed = 0;    ///< of the views' samples: the same for all, so that they differ by the pose alone
-    double floor_most_px = 1;  ///< refused if matches scatter by more: the frame does not show the model
+    double floor_max_px = 1;   ///< refused if matches scatter by more: the frame does not show the model
     ModelUncertainty model{};  ///< albedo is not used, as views are scaled to the frame's light
 };
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "estimator/pose/pnp_points.h"
+#include "estimator/pnp/pnp_points.h"
 #include "estimator/view/measured_image.h"
 #include "renderer/frame/camera_image.h"
 

@@ -8,8 +8,8 @@
 
 #include "base/constants.h"
 #include "estimator/features/feature_matcher.h"
-#include "estimator/pose/median.h"
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/median.h"
+#include "estimator/least_squares/symmetric.h"
 
 namespace narpa {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "estimator/pose/pnp_points.h"
+#include "estimator/pnp/pnp_points.h"
 #include "estimator/pose/pose_estimate.h"
 #include "renderer/projection/camera_model.h"
 

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/symmetric.h"
 
 namespace narpa {
 namespace {

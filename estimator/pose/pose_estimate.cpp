@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/pose/symmetric.h"
+#include "estimator/least_squares/symmetric.h"
 
 namespace narpa {
 Rigid3 displaced(const Rigid3& T, const Vector6& error) {
@@ -41,16 +41,6 @@ double normalised_error_squared(const Vector6& error, const Matrix6& covariance)
     const Cholesky factor = cholesky(covariance);
     if (!factor.positive_definite) return std::numeric_limits<double>::infinity();
     return lower_solve(factor.L, error).squaredNorm();
-}
-
-Matrix6 covariance_of_inverse(const Rigid3& T, const Matrix6& covariance) {
-    // q^-1 exp(-r) = exp(-q^-1 r) q^-1;  t' = -q^-1 exp(-r) (t + d)  =>  d' = -q^-1 (d + [t] r)
-    const Eigen::Matrix3d R_inverse = rotation_matrix(T.q).transpose();
-    Matrix6 J = Matrix6::Zero();
-    J.topLeftCorner<3, 3>() = -R_inverse;
-    J.bottomLeftCorner<3, 3>() = -R_inverse * skew(to_eigen(T.t));
-    J.bottomRightCorner<3, 3>() = -R_inverse;
-    return J * covariance * J.transpose();
 }
 
 Matrix6 covariance_of_product(const Rigid3& T_a_b, const Matrix6& covariance_of_a_b, const Rigid3& T_b_c) {

@@ -53,8 +53,6 @@ inline constexpr double kDegree = 3.14159265358979323846 / 180;  ///< radians
 /// right. Infinite if it is not positive definite.
 [[nodiscard]] double normalised_error_squared(const Vector6& error, const Matrix6& covariance);
 
-/// The covariance of T^-1, given that of T.
-[[nodiscard]] Matrix6 covariance_of_inverse(const Rigid3& T, const Matrix6& covariance);
 /// The covariance of T_a_b * T_b_c, given that of T_a_b; T_b_c is exact.
 [[nodiscard]] Matrix6 covariance_of_product(const Rigid3& T_a_b, const Matrix6& covariance_of_a_b,
                                             const Rigid3& T_b_c);

@@ -13,7 +13,7 @@ namespace narpa {
 namespace {
 
 /// Search radii of the approach and of the fit to all points, over the target's radius.
-constexpr double kApproachCircle = 0.6, kFitCircle = 0.1;
+constexpr double kApproachRadius = 0.6, kFitRadius = 0.1;
 /// Minimum difference in attitude between the poses from which fits start.
 constexpr double kStartsApart_deg = 6;
 
@@ -28,7 +28,7 @@ std::vector<Approach> best_apart(std::vector<Approach> all, std::size_t most, do
         const bool elsewhere = std::ranges::all_of(apart, [&](const Approach& other) {
             const double turn = angle_between(a.T_lidar_target.q, other.T_lidar_target.q);
             return turn > kStartsApart_deg * kDegree ||
-                   norm(a.T_lidar_target.t - other.T_lidar_target.t) > kFitCircle * radius_m;
+                   norm(a.T_lidar_target.t - other.T_lidar_target.t) > kFitRadius * radius_m;
         });
         if (elsewhere) apart.push_back(a);
     }
@@ -53,12 +53,12 @@ Result<CloudEstimate> CloudSearch::find(std::span<const RangePoint> points, cons
     std::vector<Approach> approaches;
     for (const Quat& q : attitude_grid(options.attitudes))
         approaches.push_back(
-            icp_.approach({q, behind_m - q * tracer_.bounds(target_).centre_m}, kApproachCircle * radius_m));
+            icp_.approach({q, behind_m - q * tracer_.bounds(target_).centre_m}, kApproachRadius * radius_m));
 
     std::vector<CloudEstimate> fits;
     for (const Approach& a :
          best_apart(std::move(approaches), static_cast<std::size_t>(options.finished), radius_m))
-        if (auto fit = icp_.align(points, motion, a.T_lidar_target, kFitCircle * radius_m, empty))
+        if (auto fit = icp_.align(points, motion, a.T_lidar_target, kFitRadius * radius_m, empty))
             fits.push_back(*std::move(fit));
         else if (fit.error().kind != ErrorKind::failed)
             return fit.error();
@@ -70,7 +70,7 @@ Result<CloudEstimate> CloudSearch::find(std::span<const RangePoint> points, cons
         return is_possible(a) != is_possible(b) ? is_possible(a) : a.cost < b.cost;
     });
     // Restart from the fit itself: its distance from the grid attitude must not count against it.
-    auto again = icp_.align(points, motion, fits.front().T_lidar_target, kFitCircle * radius_m, empty);
+    auto again = icp_.align(points, motion, fits.front().T_lidar_target, kFitRadius * radius_m, empty);
     if (!again) return again.error();
     CloudEstimate best = *std::move(again);
     if (!best.answer.usable()) return best;

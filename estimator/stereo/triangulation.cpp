@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/pose/pnp_points.h"
+#include "estimator/pnp/pnp_points.h"
 
 namespace narpa {
 namespace {

@@ -1,6 +1,7 @@
 #include "estimator/view/frame_comparison.h"
 
 #include <fmt/format.h>
+#include <cassert>
 
 #include <algorithm>
 #include <cmath>
@@ -147,6 +148,8 @@ void compare_brightness(const Signals& s, const std::vector<std::size_t>& pixels
 
 Result<FrameComparison> compare_frame(const MeasuredImage& frame, const SensorModel& sensor,
                                       const ExpectedFrame& render, std::size_t target) {
+    assert(render.signal.size() == frame.dn.size() && render.body.size() == frame.dn.size());
+    assert(render.variance.empty() || render.variance.size() == frame.dn.size());
     FrameComparison out;
     Signals s;
     out.black_dn = black_of(frame, sensor, render);

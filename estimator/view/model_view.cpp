@@ -1,5 +1,7 @@
 #include "estimator/view/model_view.h"
 
+#include <cassert>
+
 namespace narpa {
 
 Rigid3 place_camera(const Rigid3& T_camera_target, const Camera& camera, std::size_t target, BodyPoses& at) {
@@ -19,7 +21,9 @@ ModelView::ModelView(const RenderScene& render_scene, const Camera& camera, std:
       target_(target),
       at_(at),
       renderer_(render_scene_, camera_, false),
-      radiance_(camera.width, camera.height) {}
+      radiance_(camera.width, camera.height) {
+    assert(target < at.T_world_body.size());
+}
 
 CameraPose ModelView::place(const Rigid3& T_camera_target) {
     T_camera_target_ = T_camera_target;
@@ -44,6 +48,7 @@ Rigid3 ModelView::T_world_camera(double row) const noexcept {
 }
 
 void ModelView::trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept {
+    assert(points.size() <= kLanes);
     const CameraModelHandle model(camera_);
     RayBatch rays;
     rays.n = points.size();

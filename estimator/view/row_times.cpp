@@ -1,6 +1,7 @@
 #include "estimator/view/row_times.h"
 
 #include <algorithm>
+#include <cassert>
 
 namespace narpa {
 
@@ -10,6 +11,7 @@ RowTimes RowTimes::scaled(double factor) const noexcept {
 }
 
 RowTimes RowTimes::part(int k, int n) const noexcept {
+    assert(0 <= k && k < n);
     const double length = exposure_s / n;
     return {middle_s - 0.5 * exposure_s + (k + 0.5) * length, row_s, length};
 }
@@ -34,6 +36,7 @@ CameraPose camera_path(const Rigid3& T_world_target, const Rigid3& T_camera_targ
 
 void to_mid_exposure(const Rigid3& T_camera_target, const ApparentMotion& motion, const RowTimes& times,
                      std::span<const Pixel> pixels, std::span<Vec3> body_m) noexcept {
+    assert(pixels.size() == body_m.size());
     if (times.at_once()) return;
     const Rigid3 T_target_camera = inverse(T_camera_target);
     for (std::size_t i = 0; i < body_m.size(); ++i)

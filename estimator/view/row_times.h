@@ -3,8 +3,8 @@
 
 #include <span>
 
+#include "estimator/pnp/pnp_points.h"
 #include "estimator/pose/apparent_motion.h"
-#include "estimator/pose/pnp_points.h"
 #include "renderer/camera/camera_pose.h"
 #include "renderer/scene/scene.h"
 

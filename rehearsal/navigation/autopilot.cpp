@@ -11,7 +11,7 @@ Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, s
     if (!model) return model.error();
     a->model_ = *std::move(model);
     for (const std::size_t camera : a->model_->cameras())
-        a->cameras_.emplace_back(*a->model_, camera, scenario.navigation.camera_method, seed);
+        a->cameras_.emplace_back(*a->model_, camera, *scenario.navigation.camera_method, seed);
     for (const std::size_t lidar : a->model_->lidars()) a->lidars_.emplace_back(*a->model_, lidar);
     for (const std::size_t lidar : a->model_->velocimeters())
         a->velocimeters_.emplace_back(*a->model_, lidar, scenario.navigation);

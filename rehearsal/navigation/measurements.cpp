@@ -12,19 +12,6 @@
 namespace narpa::rehearsal {
 namespace {
 
-FeatureSettings feature_settings(std::uint64_t seed, const ModelUncertainty& model) {
-    FeatureSettings f;
-    f.model = model;
-    f.seed = seed;
-    f.renders_max = 4;
-    f.settled_px = 0.1;  // the filter's prediction is usually so close that one render is enough
-    return f;
-}
-
-/// Factor on the estimator's covariance: consecutive frames show the same details in nearly the same pixels, so
-/// their errors are correlated (0.2 to 0.3 from one second to the next between 18 and 3 m), while the filter
-/// assumes independent errors.
-constexpr double kMatchVariance = 2.5;
 /// Radius of the search around the prediction, in standard deviations.
 constexpr double kSearchSigmas = 4;
 /// No search if the prediction is this good, as a search costs much more than an alignment.
@@ -43,17 +30,15 @@ int coarsest_level(const Prediction& predicted, const Camera& camera, double ran
 
 }  // namespace
 
-CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, CameraMethod method,
+CameraPoseEstimator::CameraPoseEstimator(SceneModel& model, std::size_t camera, const CameraMethod& method,
                                          std::uint64_t seed)
     : model_(model),
       camera_(model.scene().cameras[camera]),
-      seed_(~seed) {  // differs from the seed of the frames' random numbers
-    if (method == CameraMethod::dense)
-        pixels_.emplace(model.render_scene(), camera_, model.target());
-    else
-        features_.emplace(model.render_scene(), camera_, model.target(), BodyPoses(model.scene().bodies.size()),
-                          feature_settings(seed_, model.uncertainty()));
-}
+      method_(method),
+      estimator_(method.make(model.render_scene(), camera_, model.target(),
+                             {.seed = ~seed,  // differs from the seed of the frames' random numbers
+                              .guesses_are_predictions = true,
+                              .model = model.uncertainty()})) {}
 
 MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> bytes, std::int64_t t_ns,
                                                const Prediction& predicted) {
@@ -66,65 +51,34 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
     }
     const Rigid3& T = predicted.T_chaser_target;
     const BodyPoses& at = model_.place(predicted.t_s, normalized(predicted.q_world_chaser * T.q), inverse(T));
-    if (pixels_)
-        by_pixels(*image, at, predicted, out);
-    else
-        by_features(*image, at, predicted, out);
+    FrameInput frame{.image = *image, .at = at};
+    frame.guess = inverse(camera_.T_mount_camera) * T;
+    frame.motion = rotated(conjugate(camera_.T_mount_camera.q), predicted.motion);
+    // The light is known in camera axes, from the chaser's attitude.
+    frame.T_world_camera = at.T_world_body[model_.chaser()] * camera_.T_mount_camera;
+    frame.coarsest = coarsest_level(predicted, camera_, norm(frame.guess.t),
+                                    model_.tracer().bounding_radius_m(model_.target()), frame.coarsest);
+    frame.seed_offset = ++frames_;
+    const auto e = estimator_->estimate(frame);
     out.ms = seconds_since(start_ns) * 1e3;
-    if (out.pose) out.pose->t_ns = t_ns;
-    return out;
-}
-
-Rigid3 CameraPoseEstimator::guess(const Prediction& predicted) const {
-    return inverse(camera_.T_mount_camera) * predicted.T_chaser_target;
-}
-ApparentMotion CameraPoseEstimator::motion(const Prediction& predicted) const {
-    return rotated(conjugate(camera_.T_mount_camera.q), predicted.motion);
-}
-
-void CameraPoseEstimator::by_features(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
-                                      MeasurementResult& out) {
-    const FeatureEstimate e = features_->align(image, at, guess(predicted), motion(predicted));
-    out.points = e.agreeing;
-    out.answer = e.answer.kind;
-    out.why = e.answer.why;
-    if (!e.answer.usable()) return;
-    out.pose = {.T_sensor_target = e.T_camera_target,
-                .covariance = kMatchVariance * (e.covariance - e.covariance_of_model) + e.covariance_of_model,
-                .T_chaser_sensor = camera_.T_mount_camera,
-                .covariance_of_model = e.covariance_of_model};
-    if (e.answer.kind == AnswerKind::unobservable)
-        out.pose->root_information = e.answer.root_information / std::sqrt(kMatchVariance);
-}
-
-/// The light is known in camera axes, from the chaser's attitude.
-void CameraPoseEstimator::by_pixels(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
-                                    MeasurementResult& out) {
-    const Scene& scene = model_.scene();
-    const Rigid3 start = guess(predicted);
-    DenseOptions o;
-    o.coarsest = coarsest_level(predicted, camera_, norm(start.t),
-                                model_.tracer().bounding_radius_m(model_.target()), o.coarsest);
-    o.seed = ++seed_;
-    o.method = scene.render.method;
-    o.max_depth = scene.render.max_depth;
-    o.motion = motion(predicted);
-    o.model = model_.uncertainty();
-    o.T_world_camera = at.T_world_body[model_.chaser()] * camera_.T_mount_camera;
-    const auto e = pixels_->align(image, at, start, o);
     if (!e) {
         out.why = e.error().what;
-        return;
+        return out;
     }
-    out.points = static_cast<int>(e->pixels);
+    out.points = e->measurements;
     out.answer = e->answer.kind;
     out.why = e->answer.why;
-    if (!e->answer.usable()) return;
-    out.pose = {.T_sensor_target = e->T_camera_body,
-                .covariance = e->covariance,
+    if (!e->answer.usable()) return out;
+    const double factor = method_.variance_between_frames;
+    out.pose = {.t_ns = t_ns,
+                .T_sensor_target = e->T_camera_target,
+                .covariance = factor * (e->covariance - e->covariance_of_model) + e->covariance_of_model,
                 .T_chaser_sensor = camera_.T_mount_camera,
-                .root_information = e->answer.root_information,
                 .covariance_of_model = e->covariance_of_model};
+    // With a factor, only where motions are not observed: the root's information includes the model's uncertainty.
+    if (factor == 1 || e->answer.kind == AnswerKind::unobservable)
+        out.pose->root_information = e->answer.root_information / std::sqrt(factor);
+    return out;
 }
 
 /// Removes the beams that hit the chaser itself.

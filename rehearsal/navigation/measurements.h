@@ -1,13 +1,13 @@
 /// rehearsal/navigation/measurements.h - pose measurements of the target from camera frames and LiDAR sweeps.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 
 #include "estimator/cloud/cloud_icp.h"
-#include "estimator/dense/dense_alignment.h"
-#include "estimator/features/feature_alignment.h"
+#include "estimator/method/camera_method.h"
 #include "rehearsal/navigation/scene_model.h"
 #include "rehearsal/navigation/state_estimator.h"
 
@@ -31,11 +31,11 @@ struct MeasurementResult {
     double ms = 0;   ///< wall time
 };
 
-/// Frames of one camera: renders the model at the predicted pose and compares features or all pixels.
+/// Frames of one camera: renders the model at the predicted pose and compares.
 class CameraPoseEstimator {
 public:
     /// `model` outlives it. `camera`: index in the scene.
-    CameraPoseEstimator(SceneModel& model, std::size_t camera, CameraMethod method, std::uint64_t seed);
+    CameraPoseEstimator(SceneModel& model, std::size_t camera, const CameraMethod& method, std::uint64_t seed);
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     /// `bytes`: in the camera's format. `t_ns`: mid-exposure, the time of `predicted`. Runs on the calling thread's
@@ -44,18 +44,11 @@ public:
                                             const Prediction& predicted);
 
 private:
-    void by_features(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
-                     MeasurementResult& out);
-    void by_pixels(const MeasuredImage& image, const BodyPoses& at, const Prediction& predicted,
-                   MeasurementResult& out);
-    [[nodiscard]] Rigid3 guess(const Prediction& predicted) const;
-    [[nodiscard]] ApparentMotion motion(const Prediction& predicted) const;
-
     SceneModel& model_;
     Camera camera_;
-    std::uint64_t seed_;
-    std::optional<FeatureAlignment> features_;  ///< exactly one of the two is set
-    std::optional<DenseAlignment> pixels_;
+    const CameraMethod& method_;
+    std::unique_ptr<FrameEstimator> estimator_;
+    std::uint64_t frames_ = 0;  ///< estimated so far
 };
 
 /// Sweeps of one LiDAR: ICP of the last turn's returns, corrected for motion to the end of the turn.

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "estimator/pose/root_information.h"
+#include "estimator/uncertainty/root_information.h"
 
 namespace narpa::rehearsal {
 

@@ -23,8 +23,8 @@
 
 #include "base/pose.h"
 #include "base/result.h"
-#include "estimator/pose/camera_method.h"
-#include "estimator/pose/model_uncertainty.h"
+#include "estimator/method/camera_method.h"
+#include "estimator/uncertainty/model_uncertainty.h"
 #include "rehearsal/contact/landing.h"
 #include "rehearsal/contact/port_state.h"
 
@@ -140,7 +140,7 @@ struct Navigation {
     double map_sigma_m = 0,
            map_correlation_m = 0;              ///< errors of its heights, and their correlation length
     std::vector<std::string> cameras, lidars;  ///< names in the scene of the sensors to navigate by
-    CameraMethod camera_method = CameraMethod::features;
+    const CameraMethod* camera_method = &camera_methods().front();
     std::vector<std::string> velocimeters;  ///< LiDARs whose velocities come over CAN, beside the others
     double period_s = 1;                    ///< of measurements and of control
     /// Process noise in addition to that of the thrusters, which the filter adds itself, m^2 s^-3 and rad^2 s^-3.

@@ -257,9 +257,9 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     if (!table) return;
     Navigation& n = s.navigation;
     n.cameras = read_sensors(*table, "cameras", scene.cameras, scene, s.chaser.body);
-    static constexpr std::array<std::pair<std::string_view, CameraMethod>, 2> kMethods{
-        {{kCameraMethods[0], CameraMethod::features}, {kCameraMethods[1], CameraMethod::dense}}};
-    n.camera_method = table->choice<CameraMethod>("camera_method", kMethods).value_or(n.camera_method);
+    std::vector<std::pair<std::string_view, const CameraMethod*>> methods;
+    for (const CameraMethod& m : camera_methods()) methods.emplace_back(m.name, &m);
+    n.camera_method = table->choice<const CameraMethod*>("camera_method", methods).value_or(n.camera_method);
     n.lidars = read_sensors(*table, "lidars", scene.lidars, scene, s.chaser.body);
     n.velocimeters = read_velocimeters(*table, scene, s.chaser.body);
     const bool over_ground = s.orbit.model == Orbit::Model::surface && !n.velocimeters.empty();

@@ -38,7 +38,7 @@ TEST(BenchApproach, FindsTheDockingStationAtAllRanges) {
     const auto world = small_world(test::build_path("scenes/docking/docking.toml"), 2);
     ASSERT_TRUE(world) << world.error().text();
     ApproachOptions options;
-    options.methods = {CameraMethod::features};
+    options.methods = camera_methods().first(1);
     options.frames = 6;
     options.from_m = 60, options.to_m = 2;
     options.basin = {3};
@@ -85,7 +85,7 @@ TEST(BenchApproach, FindsTheIssBeforeTheEarthAtTheEdgeOfEclipse) {
     const auto world = small_world(path, 1);
     ASSERT_TRUE(world) << world.error().text();
     ApproachOptions options;
-    options.methods = {CameraMethod::features};
+    options.methods = camera_methods().first(1);
     options.frames = 3;
     options.from_m = 350, options.to_m = 200;
     options.along = {0, 1, 0}, options.up = {0, 0, 1};

@@ -297,7 +297,7 @@ TEST_F(EstimateTest, NoiseThatIsStatedIsExpected) {
     const FrameLedger ledger = unit.expose(0, unit.t_mid_ns(0));
     const auto answer = [&](std::optional<double> noise_dn) {
         TrackerOptions options;
-        options.method = CameraMethod::dense;
+        options.method = find_camera_method("dense");
         options.frame_noise_dn = noise_dn;
         const auto tracker = FrameTracker::create(**world, 0, options);
         return (*tracker)->take(ledger, unit.bytes(), unit.placement());

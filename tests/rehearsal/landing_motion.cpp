@@ -3,7 +3,7 @@
 #include <fstream>
 
 #include "base/time.h"
-#include "rehearsal/navigation/relative_motion.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 #include "tests/rehearsal/dynamics_support.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/guidance.h"
+#include "rehearsal/navigation/guidance/guidance.h"
 
 #include <algorithm>
 #include <cmath>

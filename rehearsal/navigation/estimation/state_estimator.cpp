@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/state_estimator.h"
+#include "rehearsal/navigation/estimation/state_estimator.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/state_estimator.h - the navigation filter with pose measurements and thruster commands as
-/// inputs: converts between the bodies' axes and the filter's centres of mass.
+/// rehearsal/navigation/estimation/state_estimator.h - the navigation filter with pose measurements and thruster
+/// commands as inputs: converts between the bodies' axes and the filter's centres of mass.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 #include "estimator/filter/pose_filter.h"
 #include "estimator/pose/apparent_motion.h"
 #include "protocols/closed_loop.h"
-#include "rehearsal/navigation/flight_control.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 
 namespace narpa::rehearsal {
 

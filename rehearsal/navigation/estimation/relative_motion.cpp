@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/relative_motion.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 
 #include <cmath>
 

@@ -259,10 +259,8 @@ std::string events(const Run& run) {
             all.emplace_back(
                 bus.seconds(bus.reports[i].t_ns),
                 fmt::format("dynamics: {}", kDynamicsPhases[static_cast<std::size_t>(bus.reports[i].phase)]));
-    constexpr const char* kFaults[] = {"thruster off",          "thruster stuck",         "attitude sensor turned",
-                                       "target's rate changed", "thruster commands lost", "throttle stuck"};
     for (const Fault& f : run.scenario.faults) {
-        const std::string what = fmt::format("fault: {} {}", kFaults[static_cast<std::size_t>(f.kind)], f.axis);
+        const std::string what = fmt::format("fault: {} {}", f.kind->title, f.axis);
         all.emplace_back(f.from_s, what);
         if (std::isfinite(f.until_s)) all.emplace_back(f.until_s, what + " is over");
     }

@@ -19,7 +19,7 @@ Scenario full_scenario() {
     s.gates.keep_out_m = 5;
     s.gates.navigation = Gates::NavigationError{};
     s.gates.contact = CaptureEnvelope{};
-    s.faults.push_back({Fault::Kind::thruster_off, 3, 5, "+fx", {}});
+    s.faults.push_back({fault_kind("thruster_off"), 3, 5, "+fx", {}});
     return s;
 }
 

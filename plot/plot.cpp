@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -100,6 +101,8 @@ std::uint8_t srgb_byte(double linear) {
 }
 
 nlohmann::json plot_image(int width, int height, int channels, std::span<const std::uint8_t> pixels) {
+    assert(pixels.size() ==
+           static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(channels));
     return {{"width", width},
             {"height", height},
             {"channels", channels},

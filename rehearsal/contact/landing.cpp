@@ -6,20 +6,35 @@
 
 namespace narpa::rehearsal {
 
+std::span<const LandingLimit> landing_limits() {
+    using S = PortState;
+    using G = Footing;
+    using L = LandingLimits;
+    static constexpr LandingLimit kLimits[] = {
+        {"vertical_m_s", "vertical_velocity", "vertical velocity", "m/s", &L::vertical_m_s,
+         [](const S& s, const G&) { return std::abs(s.closing_m_s()); }},
+        {"horizontal_m_s", "horizontal_velocity", "horizontal velocity", "m/s", &L::horizontal_m_s,
+         [](const S& s, const G&) { return s.lateral_m_s(); }},
+        {"tilt_deg", "tilt", "tilt", "deg", &L::tilt_deg,
+         [](const S& s, const G&) { return s.pitch_yaw_rad() * kDegPerRad; }},
+        {"rate_deg_s", "rate", "angular rate", "deg/s", &L::rate_deg_s,
+         [](const S& s, const G&) { return norm(s.rate_rad_s) * kDegPerRad; }},
+        {"from_site_m", "site", "distance from the site", "m", &L::from_site_m,
+         [](const S& s, const G&) { return s.lateral_m(); }},
+        {"slope_deg", "slope", "slope under the feet", "deg", &L::slope_deg,
+         [](const S&, const G& g) { return g.slope_rad * kDegPerRad; }, true},
+        {"step_m", "step", "ground above the feet's plane", "m", &L::step_m,
+         [](const S&, const G& g) { return g.step_m; }, true},
+    };
+    return kLimits;
+}
+
 ContactConditions landing_conditions(const LandingLimits& limits, const PortState& s,
                                      const std::optional<Footing>& ground) {
-    ContactConditions all{
-        {"vertical_velocity", "vertical velocity", "m/s", std::abs(s.closing_m_s()), 0, limits.vertical_m_s},
-        {"horizontal_velocity", "horizontal velocity", "m/s", s.lateral_m_s(), 0, limits.horizontal_m_s},
-        {"tilt", "tilt", "deg", s.pitch_yaw_rad() * kDegPerRad, 0, limits.tilt_deg},
-        {"rate", "angular rate", "deg/s", norm(s.rate_rad_s) * kDegPerRad, 0, limits.rate_deg_s},
-        {"site", "distance from the site", "m", s.lateral_m(), 0, limits.from_site_m},
-    };
-    if (ground) {
-        all.push_back(
-            {"slope", "slope under the feet", "deg", ground->slope_rad * kDegPerRad, 0, limits.slope_deg});
-        all.push_back({"step", "ground above the feet's plane", "m", ground->step_m, 0, limits.step_m});
-    }
+    ContactConditions all;
+    for (const LandingLimit& l : landing_limits())
+        if (ground || !l.of_ground)
+            all.push_back({l.name, l.title, l.unit, l.value(s, ground.value_or(Footing{})), 0, limits.*l.max});
     return all;
 }
 

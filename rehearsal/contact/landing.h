@@ -1,6 +1,9 @@
 /// rehearsal/contact/landing.h - limits of a landing, and the values that they apply to.
 #pragma once
 
+#include <span>
+#include <string_view>
+
 #include "rehearsal/contact/port_state.h"
 #include "rehearsal/contact/terrain.h"
 
@@ -14,6 +17,16 @@ struct LandingLimits {
     double from_site_m = 10;
     double slope_deg = 10, step_m = 0.3;
 };
+
+/// One of them; each is a gate of its own.
+struct LandingLimit {
+    std::string_view key;  ///< in scenario files
+    const char *name, *title, *unit;
+    double LandingLimits::*max;
+    double (*value)(const PortState& touchdown, const Footing& ground);
+    bool of_ground = false;  ///< of the ground that it stands on
+};
+[[nodiscard]] std::span<const LandingLimit> landing_limits();
 
 /// `touchdown`: state when the first foot touches the ground. `ground`: under the feet; none: slope and step are
 /// left out.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "rehearsal/scenario/scenario.h"
@@ -36,6 +37,7 @@ std::optional<Terrain::Ground> Terrain::below(const Vec3& point_m) const {
 }
 
 std::optional<Footing> footing(const Terrain& terrain, std::span<const Vec3> feet_m) {
+    assert(feet_m.size() >= 3);
     constexpr double kSpacing_m = 0.05;
     Eigen::MatrixX3d A(static_cast<Eigen::Index>(feet_m.size()), 3);
     Eigen::VectorXd heights(static_cast<Eigen::Index>(feet_m.size()));

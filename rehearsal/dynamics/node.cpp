@@ -164,18 +164,15 @@ private:
             ++counts_.late;
         } else {
             commanded_ns_ = command.t_ns;
-            if (options_.lockstep) return apply(command);
+            if (options_.lockstep) return apply(command), Ok{};
             const std::int64_t acts_ns = std::max(now_ns, command.t_ns) - t_start_ns_;
             if (auto moved = advance_to(std::min(acts_ns, next_ns_)); !moved) return moved;
-            if (acts_ns <= next_ns_) return apply(command);
+            if (acts_ns <= next_ns_) return apply(command), Ok{};
             pending_.push_back(command);
         }
         return Ok{};
     }
-    Status apply(const ActuatorCommand& command) {
-        ++(simulation_.apply(command) ? counts_.applied : counts_.lost);
-        return Ok{};
-    }
+    void apply(const ActuatorCommand& command) { ++(simulation_.apply(command) ? counts_.applied : counts_.lost); }
 
     /// In lockstep: exactly the current time, once. In real time: newer than the last, and at most a period ahead.
     bool is_expected(std::int64_t t_ns, std::int64_t now_ns) const {
@@ -198,7 +195,7 @@ private:
             const ActuatorCommand command = pending_.front();
             pending_.pop_front();
             if (auto moved = move_to(command.t_ns - t_start_ns_); !moved) return moved;
-            static_cast<void>(apply(command));
+            apply(command);
         }
         return move_to(t_ns);
     }

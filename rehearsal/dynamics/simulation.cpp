@@ -1,6 +1,7 @@
 #include "rehearsal/dynamics/simulation.h"
 
 #include <algorithm>
+#include <cassert>
 #include <limits>
 
 #include "base/time.h"
@@ -80,9 +81,7 @@ void Simulation::place_bodies(std::uint64_t seed) {
 }
 
 bool Simulation::apply(const ActuatorCommand& command) {
-    for (const Fault& f : scenario_.faults)
-        if (f.kind == Fault::Kind::commands_lost && t_ns() >= to_ns(f.from_s) && t_ns() < to_ns(f.until_s))
-            return false;
+    if (effects_at(scenario_.faults, t_ns()).commands_lost) return false;
     command_ = command;
     thrusters_.fire(command, t_ns());
     return true;
@@ -90,12 +89,13 @@ bool Simulation::apply(const ActuatorCommand& command) {
 
 /// Advances in steps over which forces are constant.
 void Simulation::advance_to(std::int64_t t_ns) {
+    assert(t_ns >= state_.t_ns);
     if (ground_) return advance_lander(t_ns);
     if (at_contact_) rebound_or_hold();
     while (state_.t_ns < t_ns) {
         const std::int64_t from_ns = state_.t_ns;
         const std::int64_t until_ns =
-            std::min({t_ns, from_ns + kLongestStepNs, next_fault_ns(from_ns), thrusters_.next_change_ns(from_ns)});
+            std::min({t_ns, from_ns + kLongestStepNs, thrusters_.next_change_ns(from_ns)});
         const Loads loads = thrusters_.loads(from_ns);
         State next = after(state_, loads, until_ns - from_ns);
         if (phase_ == DynamicsPhase::flying && passes_plane(state_, next)) {
@@ -112,23 +112,10 @@ void Simulation::advance_to(std::int64_t t_ns) {
     }
 }
 
-/// Next start or end of a target_rate fault.
-std::int64_t Simulation::next_fault_ns(std::int64_t t_ns) const {
-    std::int64_t next = std::numeric_limits<std::int64_t>::max();
-    for (const Fault& f : scenario_.faults)
-        for (const std::int64_t at : {to_ns(f.from_s), to_ns(f.until_s)})
-            if (f.kind == Fault::Kind::target_rate && at > t_ns) next = std::min(next, at);
-    return next;
-}
-
-/// Applies the target_rate faults that start or end in (after_ns, until_ns]. The end of a fault undoes its change.
+/// Applies the changes of the target's rate by faults that start or end in (after_ns, until_ns].
 void Simulation::change_target_rate(std::int64_t after_ns, std::int64_t until_ns) {
-    for (const Fault& f : scenario_.faults) {
-        if (f.kind != Fault::Kind::target_rate) continue;
-        const auto due = [&](double t_s) { return to_ns(t_s) > after_ns && to_ns(t_s) <= until_ns; };
-        if (due(f.from_s)) state_.target.rate_rad_s += kDegree * f.value;
-        if (due(f.until_s)) state_.target.rate_rad_s -= kDegree * f.value;
-    }
+    state_.target.rate_rad_s += effects_at(scenario_.faults, until_ns).target_rate_rad_s -
+                                effects_at(scenario_.faults, after_ns).target_rate_rad_s;
 }
 
 void Simulation::fire_for(const Loads& loads, std::int64_t dt_ns) {
@@ -257,8 +244,7 @@ void Simulation::advance_lander(std::int64_t t_ns) {
                 loads.force_n += pushed.force_n, loads.torque_n_m += pushed.torque_n_m;
             }
         }
-        const std::int64_t until_ns =
-            std::min({t_ns, from_ns + step_ns, next_fault_ns(from_ns), thrusters_.next_change_ns(from_ns)});
+        const std::int64_t until_ns = std::min({t_ns, from_ns + step_ns, thrusters_.next_change_ns(from_ns)});
         State next = after(state_, loads, until_ns - from_ns);
         fire_for(thrusters_.loads(from_ns), until_ns - from_ns);
         state_ = next;
@@ -318,10 +304,7 @@ void Simulation::rebound(State& state) const {
 
 AttitudeReport Simulation::measure_attitude() {
     const AttitudeSensor& s = scenario_.attitude_sensor;
-    Quat bias;
-    for (const Fault& f : scenario_.faults)
-        if (f.kind == Fault::Kind::attitude_bias && t_ns() >= to_ns(f.from_s) && t_ns() < to_ns(f.until_s))
-            bias = bias * exp_rotation(kDegree * f.value);
+    const Quat bias = effects_at(scenario_.faults, t_ns()).q_attitude_bias;
     const Vec3 attitude = (s.attitude_sigma_deg * kDegree) * draw_normal(sensor_);
     const Vec3 rate = (s.rate_sigma_deg_s * kDegree) * draw_normal(sensor_);
     AttitudeReport report;

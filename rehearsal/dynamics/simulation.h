@@ -14,7 +14,7 @@
 
 #include "protocols/closed_loop.h"
 #include "rehearsal/dynamics/ground_contact.h"
-#include "rehearsal/dynamics/orbit_motion.h"
+#include "rehearsal/dynamics/rigid_body.h"
 #include "rehearsal/dynamics/thruster_model.h"
 #include "rehearsal/scenario/scenario.h"
 
@@ -85,7 +85,6 @@ private:
 
     void place_bodies(std::uint64_t seed);
     void change_target_rate(std::int64_t after_ns, std::int64_t until_ns);
-    [[nodiscard]] std::int64_t next_fault_ns(std::int64_t t_ns) const;
     [[nodiscard]] State after(const State& from, const Loads& loads, std::int64_t dt_ns) const;
     [[nodiscard]] Attitude target_after(const State& from, double dt_s) const;
     [[nodiscard]] Motion target_motion(const State& state) const;

@@ -15,6 +15,7 @@ ThrusterModel::ThrusterModel(const Scenario& scenario, std::uint64_t seed)
     : thrusters_(scenario.thrusters),
       engine_(scenario.engine),
       period_ns_(scenario.period_ns()),
+      faults_(scenario.faults),
       gains_(engine(seed, Stream::pulses)) {
     std::mt19937_64 draws = engine(seed, Stream::misalignment);
     for (int group = 0; group < kThrusterGroups; ++group) {
@@ -22,14 +23,6 @@ ThrusterModel::ThrusterModel(const Scenario& scenario, std::uint64_t seed)
         axis[group % kForceGroups / 2] = group % 2 == 0 ? 1 : -1;
         directions_[group] =
             exp_rotation((thrusters_.misalignment_sigma_deg * kDegree) * draw_normal(draws)) * axis;
-    }
-    for (const Fault& fault : scenario.faults) {
-        if (fault.kind == Fault::Kind::throttle_stuck)
-            stuck_throttle_.push_back({to_ns(fault.from_s), to_ns(fault.until_s)});
-        const bool stuck = fault.kind == Fault::Kind::thruster_stuck;
-        if (!stuck && fault.kind != Fault::Kind::thruster_off) continue;
-        const auto group = std::ranges::find(kThrusterGroupNames, fault.axis) - kThrusterGroupNames.begin();
-        faults_.push_back({to_ns(fault.from_s), to_ns(fault.until_s), static_cast<int>(group), stuck});
     }
 }
 
@@ -73,36 +66,26 @@ double ThrusterModel::full(int group) const noexcept {
 }
 
 Loads ThrusterModel::loads(std::int64_t t_ns) const {
+    const FaultEffects faults = effects_at(faults_, t_ns);
     Loads sum;
     for (int group = 0; group < kThrusterGroups; ++group)
-        (group < kForceGroups ? sum.force_n : sum.torque_n_m) += strength(group, t_ns) * directions_[group];
+        (group < kForceGroups ? sum.force_n : sum.torque_n_m) += strength(group, t_ns, faults) * directions_[group];
     return sum;
 }
 
-double ThrusterModel::strength(int group, std::int64_t t_ns) const {
-    bool off = false, stuck = false;
-    for (const GroupFault& f : faults_)
-        if (f.group == group && t_ns >= f.from_ns && t_ns < f.until_ns) (f.stuck ? stuck : off) = true;
-    if (off) return 0;
-    if (stuck) return full(group);
-    const Pulse& p = pulses_[group];
-    if (engine_ && group == static_cast<int>(engine_->group) && throttle_is_stuck(t_ns))
-        return p.strength > 0 ? engine_->least_n : 0;
+double ThrusterModel::strength(int group, std::int64_t t_ns, const FaultEffects& faults) const {
+    const auto i = static_cast<std::size_t>(group);
+    if (faults.off[i]) return 0;
+    if (faults.stuck[i]) return full(group);
+    const Pulse& p = pulses_[i];
+    if (engine_ && i == engine_->group && faults.throttle_stuck) return p.strength > 0 ? engine_->least_n : 0;
     return t_ns >= p.from_ns && t_ns < p.until_ns ? p.strength : 0;
 }
 
-bool ThrusterModel::throttle_is_stuck(std::int64_t t_ns) const {
-    return std::ranges::any_of(stuck_throttle_, [&](const auto& s) { return t_ns >= s.first && t_ns < s.second; });
-}
-
 std::int64_t ThrusterModel::next_change_ns(std::int64_t t_ns) const {
-    std::int64_t next = std::numeric_limits<std::int64_t>::max();
-    const auto consider = [&](std::int64_t at) {
-        if (at > t_ns) next = std::min(next, at);
-    };
-    for (const Pulse& p : pulses_) consider(p.until_ns);
-    for (const GroupFault& f : faults_) consider(f.from_ns), consider(f.until_ns);
-    for (const auto& [from_ns, until_ns] : stuck_throttle_) consider(from_ns), consider(until_ns);
+    std::int64_t next = rehearsal::next_change_ns(faults_, t_ns);
+    for (const Pulse& p : pulses_)
+        if (p.until_ns > t_ns) next = std::min(next, p.until_ns);
     return next;
 }
 

@@ -3,9 +3,7 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <random>
 #include <vector>
 
@@ -31,12 +29,6 @@ enum class Stream : std::uint32_t { start = 1, misalignment, pulses, attitude_se
     return v;
 }
 
-/// Nanoseconds of a scenario's seconds; infinity becomes the largest value.
-[[nodiscard]] inline std::int64_t to_ns(double t_s) {
-    constexpr double kEnd = 9.2e18;
-    return t_s * 1e9 < kEnd ? std::llround(t_s * 1e9) : std::numeric_limits<std::int64_t>::max();
-}
-
 /// Force and torque on the chaser, body axes; the torque is about the centre of mass.
 struct Loads {
     Vec3 force_n{}, torque_n_m{};
@@ -52,13 +44,13 @@ inline constexpr int kThrusterGroups = static_cast<int>(kThrusterGroupNames.size
 /// limits; it is off if the impulse is 0.
 class ThrusterModel {
 public:
-    /// Ignores faults of other kinds; those of thrusters name a group.
     ThrusterModel(const Scenario& scenario, std::uint64_t seed);
 
     /// Replaces the rest of an earlier command.
     void fire(const ActuatorCommand& command, std::int64_t t_ns);
     /// Constant from t_ns to next_change_ns(t_ns).
     [[nodiscard]] Loads loads(std::int64_t t_ns) const;
+    /// The next end of a pulse, start or end of a fault.
     [[nodiscard]] std::int64_t next_change_ns(std::int64_t t_ns) const;
 
     /// Each group's direction with its error, body axes.
@@ -69,22 +61,15 @@ private:
         std::int64_t from_ns = 0, until_ns = 0;
         double strength = 0;  ///< N, or N m
     };
-    struct GroupFault {
-        std::int64_t from_ns = 0, until_ns = 0;
-        int group = 0;
-        bool stuck = false;
-    };
     [[nodiscard]] double full(int group) const noexcept;
-    [[nodiscard]] double strength(int group, std::int64_t t_ns) const;
+    [[nodiscard]] double strength(int group, std::int64_t t_ns, const FaultEffects& faults) const;
     void fire(int group, double impulse, std::int64_t t_ns);
     void burn(double impulse, std::int64_t t_ns);
-    [[nodiscard]] bool throttle_is_stuck(std::int64_t t_ns) const;
 
     Thrusters thrusters_;
     std::optional<Engine> engine_;
     std::int64_t period_ns_;
-    std::vector<GroupFault> faults_;
-    std::vector<std::pair<std::int64_t, std::int64_t>> stuck_throttle_;  ///< from, until
+    std::vector<Fault> faults_;
     std::mt19937_64 gains_;
     std::array<Vec3, kThrusterGroups> directions_{};
     std::array<Pulse, kThrusterGroups> pulses_{};

@@ -71,28 +71,24 @@ BusRecord::Update BusRecord::accept(const CanFrame& frame, std::int64_t t_refere
         t_pose_ns = chaser_.newest_ns();
         chaser_times_.push_back(t_pose_ns);
         update.truth = compare_with_truth();
-    } else if (DynamicsReport report; take(report_decoder_, frame, t_reference_ns, report)) {
+    } else if (DynamicsReport report; count(report_decoder_.accept(frame, t_reference_ns, report))) {
         reports.push_back(report);
         update.report = true;
-    } else if (ActuatorCommand command; take(command_decoder_, frame, t_reference_ns, command)) {
+    } else if (ActuatorCommand command; count(command_decoder_.accept(frame, t_reference_ns, command))) {
         if (!commands.empty() && command.t_ns <= commands.back().t_ns) return ++late, update;
         commands.push_back(command);
         update.command = true;
-    } else if (NavigationEstimate estimate; take(estimate_decoder_, frame, t_reference_ns, estimate)) {
+    } else if (NavigationEstimate estimate; count(estimate_decoder_.accept(frame, t_reference_ns, estimate))) {
         if (estimate.t_ns <= t_estimate_ns_) return ++late, update;
         t_estimate_ns_ = estimate.t_ns;
         waiting_.push_back(estimate);
     } else if (Heartbeat beat; decode(frame, t_reference_ns, beat) == DecodeStatus::complete) {
         t_heartbeat_ns = std::max(t_heartbeat_ns, beat.t_ns);
         ++heartbeats.received;
-        heartbeats.stale += beat.stale;
-        heartbeats.deadline_missed += beat.deadline_missed;
-        heartbeats.output_dropped += beat.output_dropped;
         heartbeats.lockstep |= beat.state == RunState::lockstep;
-        update.heartbeat = true;
     } else if (const auto camera = ledger_camera(frame.id)) {
         FrameLedger ledger;
-        if (take(ledger_decoders_[*camera], frame, t_reference_ns, ledger)) ledgers.push_back(ledger);
+        if (count(ledger_decoders_[*camera].accept(frame, t_reference_ns, ledger))) ledgers.push_back(ledger);
     }
     update.estimates = judge_waiting();
     return update;
@@ -105,12 +101,6 @@ bool BusRecord::take_pose(const CanFrame& frame, std::int64_t t_reference_ns, Po
     if (track.push(command.t_valid_ns, command.motion)) return true;
     ++late;
     return false;
-}
-
-template <class Message>
-bool BusRecord::take(MessageDecoder<Message>& decoder, const CanFrame& frame, std::int64_t t_reference_ns,
-                     Message& out) {
-    return count(decoder.accept(frame, t_reference_ns, out));
 }
 
 /// True for a complete message; counts frames that cannot be decoded.

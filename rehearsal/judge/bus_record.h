@@ -59,9 +59,8 @@ struct JudgedEstimate {
     [[nodiscard]] double nees() const;
 };
 
-/// Number of heartbeats, and of those with each flag set.
 struct HeartbeatCount {
-    std::uint64_t received = 0, stale = 0, deadline_missed = 0, output_dropped = 0;
+    std::uint64_t received = 0;
     bool lockstep = false;
 };
 
@@ -70,7 +69,7 @@ public:
     /// What one frame has completed.
     struct Update {
         std::size_t truth = 0, estimates = 0;  ///< new elements at the ends of their series
-        bool report = false, command = false, heartbeat = false;
+        bool report = false, command = false;
     };
 
     explicit BusRecord(const Scenario& scenario);
@@ -108,8 +107,6 @@ private:
     bool take_pose(const CanFrame& frame, std::int64_t t_reference_ns, PoseDecoder& decoder, MotionTrack& track);
     std::size_t compare_with_truth();
     std::size_t judge_waiting();
-    template <class Message>
-    bool take(MessageDecoder<Message>& decoder, const CanFrame& frame, std::int64_t t_reference_ns, Message& out);
     bool count(DecodeStatus status);
 
     const Scenario& scenario_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 
 #include "base/constants.h"
 namespace narpa::rehearsal {
@@ -18,13 +19,19 @@ void Judge::accept(const CanFrame& frame, std::int64_t t_reference_ns) {
         check(bus_.estimates[i]);
     if (update.command && bus_.commands.back().abort != AbortReason::none && !abort_reported_) {
         abort_reported_ = true;
-        if (scenario_.gates.complete) report(complete());
+        if (scenario_.gates.complete) report("complete");
     }
 }
 
 void Judge::report(const GateResult& result) {
     ++failures_;
     if (on_failure_) on_failure_(result);
+}
+
+void Judge::report(std::string_view gate) {
+    const auto kind = std::ranges::find(gate_kinds(), gate, &GateKind::name);
+    assert(kind != gate_kinds().end());
+    if (const GateResult now = result(*kind); now.state == GateState::failed) report(now);
 }
 
 void Judge::check(const DynamicsReport& report) {
@@ -41,22 +48,16 @@ void Judge::check(const TruthState& state) {
             if (const auto touchdown = contact_made())
                 for (const ContactCondition& c : touchdown->conditions)
                     if (!c.within()) report(landing(*touchdown, c, true));
-        } else if (const GateResult result = contact(); result.state == GateState::failed) {
-            report(result);
+        } else if (scenario_.gates.contact) {
+            report("contact");
         }
     }
     if (t_last_judged_ns_ && state.t_ns > *t_last_judged_ns_) return;
     const Gates& gates = scenario_.gates;
-    const double wall_m = gates.corridor ? corridor_clearance_m(*gates.corridor, state.position_m())
-                                         : -std::numeric_limits<double>::infinity();
-    if (gates.corridor && state.range_m() < gates.corridor->from_m && corridor_.check(state, wall_m))
-        report(corridor());
-    // Inside the corridor the keep-out sphere does not apply.
-    if (gates.keep_out_m && keep_out_.check(state, std::max(wall_m, state.range_m() - *gates.keep_out_m)))
-        report(keep_out());
-    if (gates.distance_m) {
-        const auto [least, most] = *gates.distance_m;
-        if (distance_.check(state, std::min(state.range_m() - least, most - state.range_m()))) report(distance());
+    for (std::size_t i = 0; i < kGateKinds; ++i) {
+        const GateKind& kind = gate_kinds()[i];
+        const auto margin_m = kind.margin_m ? kind.margin_m(gates, state) : std::nullopt;
+        if (margin_m && poses_[i].check(state, *margin_m)) report(result(kind));
     }
 }
 
@@ -70,7 +71,7 @@ void Judge::check(const JudgedEstimate& estimate) {
     const bool too_far = position_.check(estimate, limits.position_m - norm(estimate.position_error_m));
     const bool too_turned =
         attitude_.check(estimate, limits.attitude_deg - norm(estimate.rotation_error_rad) * kDegPerRad);
-    if (scenario_.gates.navigation && (too_far || too_turned) && !reported) report(navigation());
+    if (scenario_.gates.navigation && (too_far || too_turned) && !reported) report("navigation");
 }
 
 // --- The verdict ----------------------------------------------------------------------------------------------
@@ -146,19 +147,18 @@ std::string Judge::headline(const Verdict& v, const std::string& trouble) const 
 Verdict Judge::finish(const std::string& trouble) const {
     Verdict v;
     const Gates& gates = scenario_.gates;
-    if (gates.corridor) v.gates.push_back(corridor());
-    if (gates.keep_out_m) v.gates.push_back(keep_out());
-    if (gates.distance_m) v.gates.push_back(distance());
-    if (gates.navigation) v.gates.push_back(navigation());
-    if (gates.contact) v.gates.push_back(contact());
-    v.gates.push_back(complete());
-    if (!trouble.empty()) {
-        v.gates.back().state = GateState::failed;
-        v.gates.back().reason = trouble + "; " + v.gates.back().reason;
-    }
-    if (gates.complete) v.gates.push_back(duration());
     v.contact = contact_made();
-    if (gates.landing) add_landing_gates(v);
+    for (const GateKind& kind : gate_kinds()) {
+        if (!kind.is_asked(gates)) continue;
+        if (kind.margin_m || kind.judge)
+            v.gates.push_back(result(kind));
+        else
+            add_landing_gates(v);
+    }
+    if (const auto complete = std::ranges::find(v.gates, "complete", &GateResult::name); !trouble.empty()) {
+        complete->state = GateState::failed;
+        complete->reason = trouble + "; " + complete->reason;
+    }
     v.passed = std::none_of(v.gates.begin(), v.gates.end(),
                             [](const GateResult& g) { return g.state == GateState::failed; });
     v.t_end_s = bus_.truth.empty() ? 0 : bus_.seconds(bus_.truth.back().t_ns);

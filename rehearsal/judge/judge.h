@@ -1,11 +1,14 @@
 /// rehearsal/judge/judge.h - judges a rehearsal by the messages on its bus.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "rehearsal/judge/bus_record.h"
 #include "rehearsal/judge/verdict.h"
@@ -33,6 +36,24 @@ struct LimitMonitor {
     }
 };
 
+class Judge;
+/// A kind of requirement. What is judged is one of: a limit on every pose (`margin_m`); `judge`; with neither, each
+/// of the conditions of a landing, as a gate of its own.
+struct GateKind {
+    std::string_view name;  ///< in results
+    std::string_view unit;  ///< of the margin
+    std::string_view key;   ///< in [gates]; empty: none
+    std::string_view text;  ///< for documents
+    bool (*is_asked)(const Gates&);
+    void (Judge::*judge)(GateResult&) const = nullptr;
+
+    /// Negative: violated; empty: not judged at this pose.
+    std::optional<double> (*margin_m)(const Gates&, const TruthState&) = nullptr;
+    std::string (*asked)(const Gates&) = nullptr;
+    std::string (*pose_text)(const Gates&, const TruthState&) = nullptr;
+    std::string (*not_judged)(const Gates&) = nullptr;  ///< why it was judged at no pose
+};
+
 /// "leg 2 \"hold\"", for a leg index as in the commands.
 [[nodiscard]] std::string leg_text(const Scenario& scenario, std::size_t leg);
 
@@ -44,6 +65,10 @@ struct LimitMonitor {
 class Judge {
 public:
     using Failure = std::function<void(const GateResult&)>;
+
+    static constexpr std::size_t kGateKinds = 8;
+    /// In the order of a verdict.
+    [[nodiscard]] static std::span<const GateKind, kGateKinds> gate_kinds();
 
     /// `on_failure` is called for each gate as soon as it has failed.
     explicit Judge(const Scenario& scenario, Failure on_failure = {});
@@ -67,18 +92,18 @@ private:
     void check(const JudgedEstimate& estimate);
     void check(const DynamicsReport& report);
     void report(const GateResult& result);
+    void report(std::string_view gate);  ///< if it has failed
 
-    [[nodiscard]] GateResult corridor() const;
-    [[nodiscard]] GateResult keep_out() const;
-    [[nodiscard]] GateResult distance() const;
-    [[nodiscard]] GateResult navigation() const;
-    [[nodiscard]] GateResult contact() const;
+    [[nodiscard]] GateResult result(const GateKind& kind) const;
+    void judge_poses(const GateKind& kind, GateResult& gate) const;
+    void judge_navigation(GateResult& gate) const;
+    void judge_contact(GateResult& gate) const;
+    void judge_complete(GateResult& gate) const;
+    void judge_duration(GateResult& gate) const;
     [[nodiscard]] GateResult landing(const Contact& touchdown, const ContactCondition& condition,
                                      bool of_touchdown) const;
     void add_landing_gates(Verdict& verdict) const;
     [[nodiscard]] std::optional<Footing> footing_at_end() const;
-    [[nodiscard]] GateResult complete() const;
-    [[nodiscard]] GateResult duration() const;
     [[nodiscard]] std::optional<Contact> contact_made() const;
     [[nodiscard]] NavigationStatistics navigation_statistics() const;
     [[nodiscard]] LedgerStatistics ledger_statistics() const;
@@ -93,7 +118,7 @@ private:
     std::optional<std::int64_t> t_last_judged_ns_;  ///< motion is judged up to this time
     bool abort_reported_ = false, contact_judged_ = false, measured_ = false;
 
-    LimitMonitor<TruthState> corridor_, keep_out_, distance_;
+    std::array<LimitMonitor<TruthState>, kGateKinds> poses_;  ///< of each kind with `margin_m`
     LimitMonitor<JudgedEstimate> position_, attitude_,
         sigmas_;  ///< largest errors, and those in standard deviations for the gate
 };

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/constants.h"
@@ -70,72 +71,156 @@ std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, cons
     return text;
 }
 
-/// A limit on every pose; `words` describes the pose.
-template <class Words>
-GateResult pose_gate(const char* name, std::string asked, const Scenario& scenario, const BusRecord& bus,
-                     const LimitMonitor<TruthState>& monitor, std::string not_judged, Words words) {
-    GateResult gate{.name = name, .asked = std::move(asked), .reason = std::move(not_judged)};
-    if (monitor.seen == 0) return gate;
-    gate.state = monitor.first ? GateState::failed : GateState::passed;
-    gate.margin = monitor.margin;
-    gate.unit = "m";
-    if (monitor.first) gate.t_first_s = bus.seconds(monitor.first->t_ns);
-    if (monitor.worst) gate.t_worst_s = bus.seconds(monitor.worst->t_ns);
-    gate.reason = first_and_worst(scenario, bus, monitor, words);
-    return gate;
-}
 /// " (limit 0.5 m)"; empty: there is none.
 std::string limit_text(double limit, const char* unit) {
     return std::isfinite(limit) ? fmt::format(" (limit {:g} {})", limit, unit) : std::string();
 }
 constexpr const char* kNoPoses = "no poses of both bodies were on the bus";
+std::string no_poses(const Gates&) {
+    return kNoPoses;
+}
 
 }  // namespace
+
+std::span<const GateKind, Judge::kGateKinds> Judge::gate_kinds() {
+    static constexpr std::array<GateKind, kGateKinds> kKinds{{
+        {.name = "corridor",
+         .unit = "m",
+         .key = "corridor",
+         .text = "`{half_angle_deg = 10, radius_m = 0.5, from_m = 20}`: a cone about the port's axis with radius "
+                 "`radius_m` at the port, judged nearer than `from_m`",
+         .is_asked = [](const Gates& g) { return g.corridor.has_value(); },
+         .margin_m = [](const Gates& g, const TruthState& s) -> std::optional<double> {
+             if (!g.corridor || s.range_m() >= g.corridor->from_m) return std::nullopt;
+             return corridor_clearance_m(*g.corridor, s.position_m());
+         },
+         .asked =
+             [](const Gates& g) {
+                 return fmt::format(
+                     "within a cone of {:g} deg about the port's axis, with a radius of {:g} m at the "
+                     "port, nearer than {:g} m",
+                     g.corridor->half_angle_deg, g.corridor->radius_m, g.corridor->from_m);
+             },
+         .pose_text =
+             [](const Gates& g, const TruthState& s) {
+                 const Vec3& p = s.position_m();
+                 if (p.x < 0)
+                     return fmt::format("{:.3f} m behind the port's plane and {:.3f} m off its axis", -p.x,
+                                        s.lateral_m());
+                 return fmt::format("{:.3f} m off the axis {:.2f} m before the port, the corridor allows {:.3f} m",
+                                    s.lateral_m(), p.x, corridor_clearance_m(*g.corridor, p) + s.lateral_m());
+             },
+         .not_judged =
+             [](const Gates& g) {
+                 return fmt::format("the chaser never came nearer than {:g} m", g.corridor->from_m);
+             }},
+        {.name = "keep_out",
+         .unit = "m",
+         .key = "keep_out_m",
+         .text = "radius of a sphere about the port that may be entered only through the corridor",
+         .is_asked = [](const Gates& g) { return g.keep_out_m.has_value(); },
+         // Inside the corridor the keep-out sphere does not apply.
+         .margin_m = [](const Gates& g, const TruthState& s) -> std::optional<double> {
+             if (!g.keep_out_m) return std::nullopt;
+             const double outside_m = s.range_m() - *g.keep_out_m;
+             return g.corridor ? std::max(corridor_clearance_m(*g.corridor, s.position_m()), outside_m) : outside_m;
+         },
+         .asked =
+             [](const Gates& g) {
+                 return fmt::format("no nearer to the port than {:g} m but in the corridor", *g.keep_out_m);
+             },
+         .pose_text =
+             [](const Gates&, const TruthState& s) {
+                 return fmt::format("{:.2f} m from the port, {:.2f} m off its axis", s.range_m(), s.lateral_m());
+             },
+         .not_judged = no_poses},
+        {.name = "distance",
+         .unit = "m",
+         .key = "distance_m",
+         .text = "`[least, most]`: limits of the distance between the ports, at all times",
+         .is_asked = [](const Gates& g) { return g.distance_m.has_value(); },
+         .margin_m = [](const Gates& g, const TruthState& s) -> std::optional<double> {
+             if (!g.distance_m) return std::nullopt;
+             return std::min(s.range_m() - g.distance_m->first, g.distance_m->second - s.range_m());
+         },
+         .asked =
+             [](const Gates& g) {
+                 return fmt::format("{:g} to {:g} m between the ports", g.distance_m->first, g.distance_m->second);
+             },
+         .pose_text = [](const Gates&, const TruthState& s) { return fmt::format("{:.3f} m apart", s.range_m()); },
+         .not_judged = no_poses},
+        {.name = "navigation",
+         .unit = "%",
+         .key = "navigation",
+         .text =
+             "`{sigmas = 4, share = 0.99, position_m = inf, attitude_deg = inf}`: in at least this `share` of the "
+             "estimates all six errors are within `sigmas` reported standard deviations; `position_m`, "
+             "`attitude_deg`: largest errors allowed from the first measurement on",
+         .is_asked = [](const Gates& g) { return g.navigation.has_value(); },
+         .judge = &Judge::judge_navigation},
+        {.name = "contact",
+         .unit = "% of the range",
+         .key = "contact",
+         .text = "requires contact within this capture envelope; `{}`: the default envelope below. Keys: "
+                 "`closing_min_m_s`, `closing_max_m_s`, `lateral_rate_m_s`, `lateral_m`, `pitch_yaw_deg`, "
+                 "`roll_deg`, `pitch_yaw_rate_deg_s`, `roll_rate_deg_s`",
+         .is_asked = [](const Gates& g) { return g.contact.has_value(); },
+         .judge = &Judge::judge_contact},
+        {.name = "complete",
+         .unit = "",
+         .key = "complete",
+         .text = "all legs flown within `duration_s`, without an abort",
+         .is_asked = [](const Gates&) { return true; },
+         .judge = &Judge::judge_complete},
+        {.name = "duration",
+         .unit = "s",
+         .key = "",
+         .text = "",
+         .is_asked = [](const Gates& g) { return g.complete; },
+         .judge = &Judge::judge_duration},
+        {.name = "landing",
+         .unit = "",
+         .key = "landing",
+         .text = "a table with a gate for each key, here with the defaults. At the touchdown: `vertical_m_s` 1.5, "
+                 "`horizontal_m_s` 0.5, `tilt_deg` 5, `rate_deg_s` 3, `from_site_m` 10. At rest: `slope_deg` 10 of "
+                 "the ground under the feet; `step_m` 0.3, ground above that plane within the circle of the feet",
+         .is_asked = [](const Gates& g) { return g.landing.has_value(); }},
+    }};
+    return kKinds;
+}
+
+GateResult Judge::result(const GateKind& kind) const {
+    GateResult gate{.name = std::string(kind.name)};
+    if (kind.margin_m)
+        judge_poses(kind, gate);
+    else
+        (this->*kind.judge)(gate);
+    if (gate.margin) gate.unit = kind.unit;
+    return gate;
+}
+
+void Judge::judge_poses(const GateKind& kind, GateResult& gate) const {
+    const Gates& gates = scenario_.gates;
+    const LimitMonitor<TruthState>& monitor = poses_[static_cast<std::size_t>(&kind - gate_kinds().data())];
+    gate.asked = kind.asked(gates);
+    gate.reason = kind.not_judged(gates);
+    if (monitor.seen == 0) return;
+    gate.state = monitor.first ? GateState::failed : GateState::passed;
+    gate.margin = monitor.margin;
+    if (monitor.first) gate.t_first_s = bus_.seconds(monitor.first->t_ns);
+    if (monitor.worst) gate.t_worst_s = bus_.seconds(monitor.worst->t_ns);
+    gate.reason =
+        first_and_worst(scenario_, bus_, monitor, [&](const TruthState& s) { return kind.pose_text(gates, s); });
+}
 
 std::string Judge::awaited() const {
     return missing_sender(scenario_, bus_);
 }
 
-GateResult Judge::corridor() const {
-    const Gates::Corridor& c = *scenario_.gates.corridor;
-    return pose_gate("corridor",
-                     fmt::format("within a cone of {:g} deg about the port's axis, with a radius of {:g} m at the "
-                                 "port, nearer than {:g} m",
-                                 c.half_angle_deg, c.radius_m, c.from_m),
-                     scenario_, bus_, corridor_, fmt::format("the chaser never came nearer than {:g} m", c.from_m),
-                     [&](const TruthState& s) {
-                         const Vec3& p = s.position_m();
-                         if (p.x < 0)
-                             return fmt::format("{:.3f} m behind the port's plane and {:.3f} m off its axis", -p.x,
-                                                s.lateral_m());
-                         return fmt::format(
-                             "{:.3f} m off the axis {:.2f} m before the port, the corridor allows {:.3f} m",
-                             s.lateral_m(), p.x, corridor_clearance_m(c, p) + s.lateral_m());
-                     });
-}
-
-GateResult Judge::keep_out() const {
-    return pose_gate(
-        "keep_out",
-        fmt::format("no nearer to the port than {:g} m but in the corridor", *scenario_.gates.keep_out_m),
-        scenario_, bus_, keep_out_, kNoPoses, [](const TruthState& s) {
-            return fmt::format("{:.2f} m from the port, {:.2f} m off its axis", s.range_m(), s.lateral_m());
-        });
-}
-
-GateResult Judge::distance() const {
-    const auto [least, most] = *scenario_.gates.distance_m;
-    return pose_gate("distance", fmt::format("{:g} to {:g} m between the ports", least, most), scenario_, bus_,
-                     distance_, kNoPoses,
-                     [](const TruthState& s) { return fmt::format("{:.3f} m apart", s.range_m()); });
-}
-
-GateResult Judge::navigation() const {
+void Judge::judge_navigation(GateResult& gate) const {
     const Gates::NavigationError& limits = *scenario_.gates.navigation;
-    GateResult gate{.name = "navigation",
-                    .asked = fmt::format("{:g} % of the estimates within {:g} standard "
-                                         "deviations in all six components",
-                                         limits.share * 100, limits.sigmas)};
+    gate.asked = fmt::format("{:g} % of the estimates within {:g} standard deviations in all six components",
+                             limits.share * 100, limits.sigmas);
     if (std::isfinite(limits.position_m))
         gate.asked += fmt::format(", once it has measured never {:g} m off", limits.position_m);
     if (std::isfinite(limits.attitude_deg)) gate.asked += fmt::format(", never {:g} deg off", limits.attitude_deg);
@@ -143,7 +228,7 @@ GateResult Judge::navigation() const {
         gate.state = GateState::failed;
         gate.reason = bus_.unjudged() > 0 ? "no estimate could be judged: no poses of both bodies of its time"
                                           : "no estimate was on the bus";
-        return gate;
+        return;
     }
     const auto position = [](const JudgedEstimate& e) {
         return fmt::format("{:.3f} m off, standard deviations {:.3f}, {:.3f}, {:.3f} m", norm(e.position_error_m),
@@ -162,7 +247,6 @@ GateResult Judge::navigation() const {
     const bool good = enough && !position_.first && !attitude_.first;
     gate.state = good ? GateState::passed : GateState::failed;
     gate.margin = (s.share_within - limits.share) * 100;
-    gate.unit = "%";
     if (sigmas_.worst) gate.t_worst_s = bus_.seconds(sigmas_.worst->t_ns);
     for (const auto* monitor : {&position_, &attitude_})
         if (monitor->first && (!gate.t_first_s || bus_.seconds(monitor->first->t_ns) < *gate.t_first_s))
@@ -184,7 +268,6 @@ GateResult Judge::navigation() const {
     if (good)
         gate.reason += fmt::format("; largest errors {:.3f} m{}, {:.3f} deg{}", s.position_m.max, limit_m,
                                    s.attitude_deg.max, limit_deg);
-    return gate;
 }
 
 std::optional<Contact> Judge::contact_made() const {
@@ -199,8 +282,8 @@ std::optional<Contact> Judge::contact_made() const {
                    contact_conditions(limits, *state)};
 }
 
-GateResult Judge::contact() const {
-    GateResult gate{.name = "contact", .asked = "contact within the initial contact conditions, and capture"};
+void Judge::judge_contact(GateResult& gate) const {
+    gate.asked = "contact within the initial contact conditions, and capture";
     const auto made = contact_made();
     if (!made) {
         gate.state = GateState::failed;
@@ -210,7 +293,7 @@ GateResult Judge::contact() const {
                                         bus_.truth.empty() ? kNoPoses
                                                            : fmt::format("the ports were {:.2f} m apart at the end",
                                                                          bus_.truth.back().range_m()));
-        return gate;
+        return;
     }
     gate.t_worst_s = made->t_s;
     std::string beyond;
@@ -224,7 +307,6 @@ GateResult Judge::contact() const {
                                   c.value, c.unit, c.min, c.max);
     }
     gate.margin = least * 100;
-    gate.unit = "% of the range";
     gate.state = beyond.empty() && made->captured ? GateState::passed : GateState::failed;
     if (gate.state == GateState::failed) gate.t_first_s = made->t_s;
     gate.reason = when(scenario_, bus_, *t_contact_ns_) + (made->captured ? ", captured" : ", bounced off");
@@ -237,7 +319,6 @@ GateResult Judge::contact() const {
             "yaw, {:.2f} deg roll",
             value(0), value(2), value(1), value(3), value(4));
     }
-    return gate;
 }
 
 /// The ground under the feet where the lander came to rest, or where the run ended.
@@ -283,13 +364,12 @@ GateResult Judge::landing(const Contact& touchdown, const ContactCondition& c, b
     return gate;
 }
 
-GateResult Judge::complete() const {
+void Judge::judge_complete(GateResult& gate) const {
     const bool docks = !scenario_.legs.empty() && scenario_.legs.back().contact;
-    GateResult gate{.name = "complete",
-                    .asked = !scenario_.gates.complete ? "to the end, whatever it is"
-                             : docks && scenario_.gear ? "all legs flown and landed, without an abort"
-                             : docks                   ? "all legs flown and docked, without an abort"
-                                                       : "all legs flown, without an abort"};
+    gate.asked = !scenario_.gates.complete ? "to the end, whatever it is"
+                 : docks && scenario_.gear ? "all legs flown and landed, without an abort"
+                 : docks                   ? "all legs flown and docked, without an abort"
+                                           : "all legs flown, without an abort";
     gate.state = GateState::failed;
     const auto aborted = std::find_if(bus_.commands.begin(), bus_.commands.end(),
                                       [](const ActuatorCommand& c) { return c.abort != AbortReason::none; });
@@ -300,12 +380,12 @@ GateResult Judge::complete() const {
             fmt::format("the navigation gave up at t = {:.2f} s in {}: {}", *gate.t_first_s,
                         leg_text(scenario_, aborted->leg), kAbortReasons[static_cast<std::size_t>(aborted->abort)]);
     }
-    if (gave_up && scenario_.gates.complete) return gate;
+    if (gave_up && scenario_.gates.complete) return;
     const DynamicsReport* finished = bus_.first_report(DynamicsPhase::finished);
     if (!finished) {
         gate.reason +=
             (gave_up ? "; the run broke off: " : "the run broke off: ") + missing_sender(scenario_, bus_);
-        return gate;
+        return;
     }
     const double t_end_s = bus_.seconds(finished->t_ns);
     const auto done = std::find_if(bus_.commands.begin(), bus_.commands.end(),
@@ -317,7 +397,7 @@ GateResult Judge::complete() const {
                                           bus_.seconds(*t_captured_ns_))
                             : fmt::format("all {} legs flown by t = {:.2f} s", scenario_.legs.size(),
                                           bus_.seconds(done->t_ns));
-        return gate;
+        return;
     }
     if (!gate.reason.empty()) gate.reason += "; ";
     gate.reason += fmt::format("over at t = {:.2f} s", t_end_s);
@@ -327,11 +407,10 @@ GateResult Judge::complete() const {
         gate.reason += bus_.first_report(DynamicsPhase::crashed) ? ", it crashed"
                        : scenario_.gear                          ? ", it came to no rest"
                                                                  : ", after a contact that bounced";
-    return gate;
 }
 
-GateResult Judge::duration() const {
-    GateResult gate{.name = "duration", .asked = fmt::format("done within {:g} s", scenario_.duration_s)};
+void Judge::judge_duration(GateResult& gate) const {
+    gate.asked = fmt::format("done within {:g} s", scenario_.duration_s);
     const bool docks = !scenario_.legs.empty() && scenario_.legs.back().contact;
     std::optional<double> t_done_s;
     for (const ActuatorCommand& c : bus_.commands)
@@ -341,17 +420,15 @@ GateResult Judge::duration() const {
     const bool timed_out = !t_done_s && finished && bus_.seconds(finished->t_ns) >= scenario_.duration_s - 1e-6;
     if (!t_done_s && !timed_out) {
         gate.reason = "it did not come to its goal";
-        return gate;
+        return;
     }
     const double t_s = t_done_s ? *t_done_s : bus_.seconds(finished->t_ns);
     gate.state = t_done_s && t_s <= scenario_.duration_s ? GateState::passed : GateState::failed;
-    gate.unit = "s";
     gate.margin = scenario_.duration_s - t_s;
     gate.t_worst_s = t_s;
     if (gate.state == GateState::failed) gate.t_first_s = scenario_.duration_s;
     gate.reason = t_done_s ? fmt::format("done at t = {:.2f} s", t_s)
                            : fmt::format("the goal was not reached when {:g} s were over", scenario_.duration_s);
-    return gate;
 }
 
 }  // namespace narpa::rehearsal

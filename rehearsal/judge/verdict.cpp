@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -60,6 +61,7 @@ Distribution distribution(std::vector<double> values) {
 }
 
 std::pair<double, double> success_interval(std::size_t successes, std::size_t trials, double confidence) {
+    assert(trials > 0 && successes <= trials);
     const double tail = 0.5 * (1 - confidence);
     const double low =
         successes == 0 ? 0 : crossing([&](double p) { return at_least(successes, trials, p); }, tail);
@@ -76,7 +78,7 @@ json number_or_null(const std::optional<double>& value) {
     return value && std::isfinite(*value) ? json(*value) : json(nullptr);
 }
 
-json of_gate(const GateResult& g) {
+json gate_json(const GateResult& g) {
     return {{"name", g.name},
             {"asked", g.asked},
             {"state", std::string(kGateStates[static_cast<std::size_t>(g.state)])},
@@ -87,7 +89,7 @@ json of_gate(const GateResult& g) {
             {"t_worst_s", number_or_null(g.t_worst_s)}};
 }
 
-json of_contact(const Contact& c) {
+json contact_json(const Contact& c) {
     json conditions = json::array();
     for (const ContactCondition& k : c.conditions)
         conditions.push_back({{"name", k.name},
@@ -116,7 +118,7 @@ json to_json(const Distribution& d) {
 
 json to_json(const Verdict& v) {
     json gates = json::array();
-    for (const GateResult& g : v.gates) gates.push_back(of_gate(g));
+    for (const GateResult& g : v.gates) gates.push_back(gate_json(g));
     const NavigationStatistics& n = v.navigation;
     const LedgerStatistics& l = v.ledger;
     return {{"passed", v.passed},
@@ -124,7 +126,7 @@ json to_json(const Verdict& v) {
             {"t_end_s", v.t_end_s},
             {"mode", v.lockstep ? "lockstep" : "real time"},
             {"gates", gates},
-            {"contact", v.contact ? of_contact(*v.contact) : json(nullptr)},
+            {"contact", v.contact ? contact_json(*v.contact) : json(nullptr)},
             {"navigation",
              {{"estimates", n.estimates},
               {"with_frames", n.with_frames},
@@ -150,52 +152,6 @@ json to_json(const Verdict& v) {
               {"heartbeats", v.heartbeats},
               {"refused", v.refused},
               {"late", v.late}}}};
-}
-
-std::string escape(std::string_view text) {
-    std::string out;
-    for (const char c : text) switch (c) {
-            case '&': out += "&amp;"; break;
-            case '<': out += "&lt;"; break;
-            case '>': out += "&gt;"; break;
-            case '"': out += "&quot;"; break;
-            case '\'': out += "&#39;"; break;
-            default:
-                if (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t')
-                    out += "\xEF\xBF\xBD";
-                else
-                    out += c;
-        }
-    return out;
-}
-
-std::string junit(const Verdict& v, const std::string& suite, double wall_s) {
-    const auto in_state = [&](GateState state) {
-        return std::count_if(v.gates.begin(), v.gates.end(), [&](const GateResult& g) { return g.state == state; });
-    };
-    std::string out = fmt::format(
-        "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\" time=\"{:.3f}\">\n",
-        escape(suite), v.gates.size(), in_state(GateState::failed), in_state(GateState::not_judged), wall_s);
-    for (const GateResult& g : v.gates) {
-        out += fmt::format("    <testcase classname=\"{}\" name=\"{}\" time=\"0\"", escape(suite), escape(g.name));
-        const std::string reason = escape(g.reason), asked = escape(g.asked);
-        switch (g.state) {
-            case GateState::passed:
-                out += fmt::format(">\n      <system-out>asked: {}; {}</system-out>\n    </testcase>\n", asked,
-                                   reason);
-                break;
-            case GateState::failed:
-                out += fmt::format(
-                    ">\n      <failure type=\"gate\" message=\"{}\">asked: {}</failure>\n    "
-                    "</testcase>\n",
-                    reason, asked);
-                break;
-            case GateState::not_judged:
-                out += fmt::format(">\n      <skipped message=\"{}\"/>\n    </testcase>\n", reason);
-                break;
-        }
-    }
-    return out + "  </testsuite>\n";
 }
 
 }  // namespace narpa::rehearsal

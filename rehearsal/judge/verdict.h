@@ -79,9 +79,4 @@ struct Verdict {
 [[nodiscard]] nlohmann::json to_json(const Verdict& verdict);
 [[nodiscard]] nlohmann::json to_json(const Distribution& d);
 
-/// A <testsuite> of this name with a test case for each gate; a document has them within <testsuites>.
-[[nodiscard]] std::string junit(const Verdict& verdict, const std::string& suite, double wall_s);
-/// For attributes and text of XML and HTML; what XML forbids becomes U+FFFD.
-[[nodiscard]] std::string escape(std::string_view text);
-
 }  // namespace narpa::rehearsal

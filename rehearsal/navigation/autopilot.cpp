@@ -1,5 +1,6 @@
 #include "rehearsal/navigation/autopilot.h"
 
+#include <cassert>
 #include <cmath>
 #include <utility>
 
@@ -58,11 +59,13 @@ Prediction Autopilot::predict(std::int64_t t_ns) {
 }
 
 void Autopilot::take_frame(std::size_t camera, std::int64_t t_ns, std::span<const std::uint8_t> bytes) {
+    assert(camera < cameras_.size());
     CameraPoseEstimator& estimator = cameras_[camera];
     take(estimator.camera().name, t_ns, estimator.measure(bytes, t_ns, predict(t_ns)), frames_);
 }
 
 void Autopilot::take_sweep(std::size_t lidar, std::int64_t t_ns, LidarSweep sweep) {
+    assert(lidar < lidars_.size());
     LidarPoseEstimator& estimator = lidars_[lidar];
     for (RangePoint& point : sweep.points) point.range_m += scenario_.model_error.error.range_bias_m;
     take(estimator.lidar().name, t_ns, estimator.measure(std::move(sweep), t_ns, predict(t_ns)), sweeps_);
@@ -77,7 +80,7 @@ void Autopilot::take_beam(const LidarBeamReport& report) {
                                      static_cast<MeasurementRecord::Outcome>(result.outcome), result.nis,
                                      result.why, 1, 0});
         };
-        if (scenario_.orbit.model == Orbit::Model::surface) {
+        if (scenario_.orbit.model->over_ground) {
             const double sigma_m = position_sigma(estimator_->estimate().covariance);
             if (const auto range = velocimeter.measure_range(report, estimator_->predicted(report.t_ns), sigma_m)) {
                 const UpdateResult result = estimator_->take(*range);
@@ -115,6 +118,7 @@ void Autopilot::take(const std::string& sensor, std::int64_t t_ns, const Measure
 }
 
 CycleRecord Autopilot::cycle(std::int64_t t_ns, std::int64_t lead_ns) {
+    assert(estimator_ && guidance_ && control_);
     const std::lock_guard lock(mutex_);
     CycleRecord out;
     estimator_->advance(t_ns);

@@ -10,9 +10,9 @@
 #include <mutex>
 #include <vector>
 
-#include "rehearsal/navigation/guidance.h"
-#include "rehearsal/navigation/measurements.h"
-#include "rehearsal/navigation/velocimeter.h"
+#include "rehearsal/navigation/estimation/measurements.h"
+#include "rehearsal/navigation/estimation/velocimeter.h"
+#include "rehearsal/navigation/guidance/guidance.h"
 
 namespace narpa::rehearsal {
 

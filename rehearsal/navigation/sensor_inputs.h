@@ -12,8 +12,8 @@
 #include "drivers/video/video_source.h"
 #include "estimator/cloud/range_points.h"
 #include "protocols/lidar/lidar_model.h"
+#include "rehearsal/navigation/estimation/scene_model.h"
 #include "rehearsal/navigation/node.h"
-#include "rehearsal/navigation/scene_model.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa::rehearsal {

@@ -11,8 +11,8 @@
 
 #include "base/program_beside.h"
 #include "base/write_file.h"
+#include "rehearsal/report/run_report.h"
 #include "rehearsal/runner/child_process.h"
-#include "rehearsal/runner/report.h"
 #include "rehearsal/runner/run_folder.h"
 
 namespace narpa::rehearsal {
@@ -160,7 +160,7 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     summary["scenario_hash"] = texts->hash;
     summary["version"] = o.run.version;
     const std::string page = o.run.folder + "/index.html";
-    if (Status good = write_junit(o.run.folder + "/junit.xml", campaign_junit(scenario->name, runs)); !good)
+    if (Status good = write_file(o.run.folder + "/junit.xml", campaign_junit(scenario->name, runs)); !good)
         return good.error();
     if (Status good = write_file(o.run.folder + "/summary.json", summary.dump(2) + "\n"); !good)
         return good.error();

@@ -5,12 +5,11 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include "base/result.h"
 #include "base/stop.h"
+#include "rehearsal/report/campaign_report.h"
 #include "rehearsal/runner/rehearsal.h"
-#include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {
 
@@ -32,26 +31,7 @@ struct RunProgress {
 /// Progress from the last progress line in a run's log.
 [[nodiscard]] RunProgress progress_of(const std::string& log);
 
-/// One run of a campaign.
-struct RunResult {
-    std::size_t run = 0;
-    std::uint64_t seed = 0;
-    std::string folder;     ///< within the campaign's
-    nlohmann::json result;  ///< the content of its result.json; null: none
-};
 /// True if a run's folder has a result of this scenario and seed.
 [[nodiscard]] bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed);
-
-/// The "contact" objects of the runs that made contact.
-[[nodiscard]] std::vector<nlohmann::json> contacts_of(const std::vector<RunResult>& runs);
-/// Success rate with its interval, failures by gate and reason, contact conditions, navigation.
-[[nodiscard]] nlohmann::json summarise(const Scenario& scenario, const std::vector<RunResult>& runs);
-/// "98 of 100 runs succeeded: 98.0 %", or the number flown if not all were.
-[[nodiscard]] std::string campaign_headline(const nlohmann::json& summary);
-/// Embeds the charts of FOLDER/charts.
-[[nodiscard]] std::string campaign_page(const Scenario& scenario, const nlohmann::json& summary,
-                                        const std::string& folder);
-/// A test case for each run, by its first failed gate.
-[[nodiscard]] std::string campaign_junit(const std::string& suite, const std::vector<RunResult>& runs);
 
 }  // namespace narpa::rehearsal

@@ -16,9 +16,9 @@
 #include "base/write_file.h"
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/judge/judge.h"
+#include "rehearsal/report/run_report.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/free_port.h"
-#include "rehearsal/runner/report.h"
 #include "rehearsal/runner/run_folder.h"
 
 namespace narpa::rehearsal {
@@ -417,7 +417,7 @@ private:
                             {"trouble", trouble_}});
         // The verdict is written first: on a full disk the rest may have no room.
         keep_first(done.written, write_whole(in_folder("result.json"), done.result.dump(2) + "\n"));
-        keep_first(done.written, write_junit(in_folder("junit.xml"), junit(v, scenario_.name, done.wall_s)));
+        keep_first(done.written, write_whole(in_folder("junit.xml"), junit(v, scenario_.name, done.wall_s)));
         if (!options_.page) return done;
         record_["wall_s"] = done.wall_s;
         keep_first(done.written, draw_charts(options_.folder, rehearsal_plot(scenario_, judge_.bus(), v)));

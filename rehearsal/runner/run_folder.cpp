@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <sstream>
 
-#include "base/write_file.h"
 #include "renderer/keys/based_on.h"
 
 namespace narpa::rehearsal {
@@ -47,11 +46,6 @@ Result<ScenarioTexts> scenario_texts(const Scenario& scenario) {
         if (Status good = read(map, "scene", texts.map); !good) return good.error();
     texts.hash = fmt::format("{:016x}", fnv1a(texts.map, fnv1a(texts.scene, fnv1a(texts.scenario))));
     return texts;
-}
-
-Status write_junit(const std::string& file, const std::string& suites) {
-    return write_file(file,
-                      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n" + suites + "</testsuites>\n");
 }
 
 Result<Descriptor> lock_folder(const std::string& folder) {

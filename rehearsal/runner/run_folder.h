@@ -21,7 +21,4 @@ struct ScenarioTexts {
 };
 Result<ScenarioTexts> scenario_texts(const Scenario& scenario);
 
-/// An XML document of test suites.
-Status write_junit(const std::string& file, const std::string& suites);
-
 }  // namespace narpa::rehearsal

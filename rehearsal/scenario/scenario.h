@@ -13,9 +13,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -27,35 +25,10 @@
 #include "estimator/uncertainty/model_uncertainty.h"
 #include "rehearsal/contact/landing.h"
 #include "rehearsal/contact/port_state.h"
+#include "rehearsal/orbit/orbit.h"
+#include "rehearsal/scenario/fault.h"
 
 namespace narpa::rehearsal {
-
-struct Orbit {
-    enum class Model : std::uint8_t {
-        free,                ///< no attractor: the world is inertial, and so is "LVLH"
-        clohessy_wiltshire,  ///< linear, about a circular orbit
-        two_body,            ///< both bodies about a point mass
-        surface,             ///< the target is ground of a rotating planet, with J2
-    };
-    Model model = Model::clohessy_wiltshire;
-    double radius_m = 6'778'137, mu_m3_s2 = 3.986004418e14;
-    Vec3 up{0, 0, 1}, along{1, 0, 0};  ///< world axes at time 0: away from the attractor, and the target's velocity
-    /// Surface: radius_m is the distance of the target's centre of mass from the planet's; `up` points away from
-    /// it.
-    Vec3 axis{0, 1, 0};  ///< of the planet's rotation, world axes
-    double rotation_rad_s = 0, j2 = 0, equatorial_radius_m = 0;
-
-    /// 0 for the free model; the planet's rotation rate for the surface model.
-    [[nodiscard]] double rate_rad_s() const;
-    /// Rotation from the frame of relative motion (LVLH, or axes that rotate with the planet) to world axes.
-    [[nodiscard]] Quat q_world_frame(double t_s) const;
-    /// Surface: gravity at `from_centre_m` of a planet with the given axis of rotation, in the axes of both: point
-    /// mass and J2 (O. Montenbruck, E. Gill, Satellite Orbits, 2000, section 3.2).
-    [[nodiscard]] Vec3 gravity_m_s2(const Vec3& from_centre_m, const Vec3& unit_axis) const;
-    /// Surface: acceleration of a free body at `position_m` from the target's centre of mass, which moves with the
-    /// ground; world axes (inertial).
-    [[nodiscard]] Vec3 relative_free_fall_m_s2(double t_s, const Vec3& position_m) const;
-};
 
 /// A rigid body of the scene that the dynamics command.
 struct Vehicle {
@@ -73,8 +46,6 @@ struct TargetMotion {
     Vec3 rate_deg_s{};      ///< body axes, at time 0; relative to LVLH or to inertial space
 };
 
-inline constexpr std::array<std::string_view, 12> kThrusterGroupNames{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
-                                                                      "+tx", "-tx", "+ty", "-ty", "+tz", "-tz"};
 /// Six pairs of thruster groups, one for each direction of force and torque along the chaser's body axes.
 struct Thrusters {
     double force_n = 400, torque_n_m = 400;  ///< of a group that fires
@@ -164,21 +135,6 @@ struct Control {
     double damping = 0.9;
     double retreat_m_s = 0.3;  ///< away from the port, after an abort
     double turn_deg_s = 1;     ///< largest rate of attitude corrections
-};
-
-struct Fault {
-    enum class Kind : std::uint8_t {
-        thruster_off,    ///< the group along `axis` does not fire
-        thruster_stuck,  ///< it fires all the time
-        attitude_bias,   ///< the attitude sensor is turned by `value` (deg, body axes)
-        target_rate,     ///< the target's rate is changed by `value` (deg/s, body axes)
-        commands_lost,   ///< no actuator command is delivered
-        throttle_stuck,  ///< the engine burns with its least force whenever it burns
-    };
-    Kind kind{};
-    double from_s = 0, until_s = std::numeric_limits<double>::infinity();
-    std::string axis;  ///< "+fx", "-fz", "+tx" ...: force or torque, chaser's body axes
-    Vec3 value{};
 };
 
 /// Requirements; an absent gate is not judged.

@@ -18,7 +18,6 @@ namespace {
 constexpr double kLongest_s = 1e6;
 /// Twice the rate of an orbit just above a body of 22 g/cm^3, denser than any known.
 constexpr double kFastestOrbit_rad_s = 5e-3;
-constexpr Range kAngle_deg{.low = -360, .high = 360};
 
 const Body* body_named(const Scene& scene, const std::string& name) {
     const auto body = std::ranges::find(scene.bodies, name, &Body::name);
@@ -38,17 +37,14 @@ Rigid3 read_port(TableReader& table) {
 void read_orbit(TableReader& root, Orbit& orbit) {
     auto table = root.table("orbit");
     if (!table) return;
-    static constexpr std::array<std::pair<std::string_view, Orbit::Model>, 4> kModels{
-        {{"free", Orbit::Model::free},
-         {"clohessy-wiltshire", Orbit::Model::clohessy_wiltshire},
-         {"two-body", Orbit::Model::two_body},
-         {"surface", Orbit::Model::surface}}};
-    orbit.model = table->choice<Orbit::Model>("model", kModels).value_or(orbit.model);
+    std::vector<std::pair<std::string_view, const OrbitModel*>> models;
+    for (const OrbitModel& model : orbit_models()) models.emplace_back(model.name, &model);
+    orbit.model = table->choice<const OrbitModel*>("model", models).value_or(orbit.model);
     read(*table, "radius_m", orbit.radius_m, kPositive);
     read(*table, "mu_m3_s2", orbit.mu_m3_s2, kPositive);
     orbit.up = table->direction("up").value_or(orbit.up);
     orbit.along = table->direction("along").value_or(orbit.along);
-    if (orbit.model == Orbit::Model::surface) {
+    if (orbit.model->over_ground) {
         orbit.axis = table->direction("axis").value_or(orbit.axis);
         read(*table, "rotation_rad_s", orbit.rotation_rad_s, kNotNegative);
         read(*table, "j2", orbit.j2);
@@ -58,7 +54,7 @@ void read_orbit(TableReader& root, Orbit& orbit) {
         for (const char* key : {"axis", "rotation_rad_s", "j2", "equatorial_radius_m"})
             table->refuse(key, "belongs to model \"surface\"");
     }
-    if (orbit.model != Orbit::Model::surface && std::abs(dot(orbit.up, orbit.along)) > 1e-6)
+    if (!orbit.model->over_ground && std::abs(dot(orbit.up, orbit.along)) > 1e-6)
         table->fail("along", "expected a direction at right angles to `up`: the orbit is circular");
     if (!(orbit.rate_rad_s() <= kFastestOrbit_rad_s))
         table->fail("radius_m", fmt::format("with mu_m3_s2 = {:g} it turns at {:.3g} rad/s, expected at most {:g}",
@@ -121,11 +117,11 @@ void read_attractor(TableReader& root, Scenario& s, const Scene& scene) {
     }
     if (table->has("body") && !s.attractor)
         table->fail("body", fmt::format("\"{}\" is no body with a can_id of {}", name, scene.file));
-    if (s.orbit.model == Orbit::Model::free)
+    if (!s.orbit.model->has_attractor && !s.orbit.model->over_ground)
         table->fail("body", "[orbit] has model \"free\", expected none: nothing attracts");
-    if (s.orbit.model == Orbit::Model::surface)
+    if (s.orbit.model->over_ground)
         table->fail("body", "[orbit] has model \"surface\", expected none: the target is the attractor's ground");
-    if (s.attractor && s.orbit.model != Orbit::Model::surface && (name == s.target.body || name == s.chaser.body))
+    if (s.attractor && !s.orbit.model->over_ground && (name == s.target.body || name == s.chaser.body))
         table->fail("body", fmt::format("is the {} too, expected another body",
                                         name == s.target.body ? "target" : "chaser"));
     table->finish();
@@ -262,7 +258,7 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     n.camera_method = table->choice<const CameraMethod*>("camera_method", methods).value_or(n.camera_method);
     n.lidars = read_sensors(*table, "lidars", scene.lidars, scene, s.chaser.body);
     n.velocimeters = read_velocimeters(*table, scene, s.chaser.body);
-    const bool over_ground = s.orbit.model == Orbit::Model::surface && !n.velocimeters.empty();
+    const bool over_ground = s.orbit.model->over_ground && !n.velocimeters.empty();
     if (n.cameras.empty() && n.lidars.empty() && !over_ground)
         table->fail(table->has("lidars") ? "lidars" : "cameras",
                     "no sensor, expected a camera or a LiDAR to navigate by");
@@ -307,45 +303,6 @@ void read_control(TableReader& root, Control& c) {
     read(*table, "retreat_m_s", c.retreat_m_s, kPositive);
     read(*table, "turn_deg_s", c.turn_deg_s, kPositive);
     table->finish();
-}
-
-void read_faults(TableReader& root, bool has_engine, double duration_s, std::vector<Fault>& faults) {
-    static constexpr std::array<std::pair<std::string_view, Fault::Kind>, 6> kKinds{
-        {{"thruster_off", Fault::Kind::thruster_off},
-         {"thruster_stuck", Fault::Kind::thruster_stuck},
-         {"attitude_bias", Fault::Kind::attitude_bias},
-         {"target_rate", Fault::Kind::target_rate},
-         {"commands_lost", Fault::Kind::commands_lost},
-         {"throttle_stuck", Fault::Kind::throttle_stuck}}};
-    for (TableReader& table : root.tables("fault")) {
-        Fault fault;
-        table.require("kind", "what goes wrong");
-        fault.kind = table.choice<Fault::Kind>("kind", kKinds).value_or(fault.kind);
-        read(table, "from_s", fault.from_s, kNotNegative);
-        read(table, "until_s", fault.until_s, kPositive);
-        if (!(fault.from_s < duration_s))
-            table.fail("from_s", fmt::format("is {:g}, expected less than duration_s of [scenario], {:g}",
-                                             fault.from_s, duration_s));
-        if (!(fault.until_s > fault.from_s))
-            table.fail("until_s",
-                       fmt::format("is {:g}, expected more than from_s, {:g}", fault.until_s, fault.from_s));
-        const bool thruster = fault.kind == Fault::Kind::thruster_off || fault.kind == Fault::Kind::thruster_stuck;
-        const bool turns = fault.kind == Fault::Kind::attitude_bias || fault.kind == Fault::Kind::target_rate;
-        if (fault.kind == Fault::Kind::throttle_stuck && !has_engine)
-            table.fail("kind", "there is no throttle, expected a table [engine]");
-        if (thruster) table.require("axis", "\"+fx\", \"-fx\" ... \"+tz\", \"-tz\": a group of thrusters");
-        if (turns) table.require("value", "[x, y, z]");
-        if (!thruster) table.refuse("axis", "belongs to faults of thrusters");
-        if (!turns) table.refuse("value", "belongs to attitude_bias and target_rate");
-        fault.axis = thruster ? table.text("axis").value_or("") : "";
-        if (turns) fault.value = table.vec3("value", kAngle_deg).value_or(Vec3{});
-        if (thruster && table.has("axis") &&
-            std::ranges::find(kThrusterGroupNames, fault.axis) == kThrusterGroupNames.end())
-            table.fail("axis", fmt::format("\"{}\" is no group of thrusters, expected one of {}", fault.axis,
-                                           fmt::join(kThrusterGroupNames, ", ")));
-        table.finish();
-        faults.push_back(fault);
-    }
 }
 
 void read_contact(TableReader& gates, Gates& out) {
@@ -447,7 +404,8 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
     read_navigation(root, s, *scene);
     read_model_error(root, s.model_error);
     read_control(root, s.control);
-    read_faults(root, s.engine.has_value(), s.duration_s, s.faults);
+    for (TableReader& table : root.tables("fault"))
+        s.faults.push_back(read_fault(table, s.engine.has_value(), s.duration_s));
     if (!s.legs.empty()) read_gates(root, s);
     root.finish();
 }

@@ -43,7 +43,7 @@ LandingGear read_gear(TableReader& table, const Scenario& s) {
     read(table, "friction", g.friction, kNotNegative);
     read(table, "stroke_m", g.stroke_m, kPositive);
     read(table, "tipped_deg", g.tipped_deg, {.low = 1, .high = 89});
-    if (s.orbit.model != Orbit::Model::surface)
+    if (!s.orbit.model->over_ground)
         table.fail("radius_m", "there is no ground, expected [orbit] with model \"surface\"");
     table.finish();
     return g;
@@ -53,13 +53,7 @@ void read_landing(TableReader& gates, const Scenario& s, Gates& out) {
     auto table = gates.table("landing");
     if (!table) return;
     LandingLimits l;
-    read(*table, "vertical_m_s", l.vertical_m_s, kNotNegative);
-    read(*table, "horizontal_m_s", l.horizontal_m_s, kNotNegative);
-    read(*table, "tilt_deg", l.tilt_deg, kNotNegative);
-    read(*table, "rate_deg_s", l.rate_deg_s, kNotNegative);
-    read(*table, "from_site_m", l.from_site_m, kNotNegative);
-    read(*table, "slope_deg", l.slope_deg, kNotNegative);
-    read(*table, "step_m", l.step_m, kNotNegative);
+    for (const LandingLimit& limit : landing_limits()) read(*table, limit.key, l.*limit.max, kNotNegative);
     table->finish();
     if (!s.gear) gates.fail("landing", "nothing lands, expected a table [landing_gear]");
     out.landing = l;

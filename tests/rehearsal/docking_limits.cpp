@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "rehearsal/navigation/relative_motion.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 #include "tests/rehearsal/dynamics_support.h"
 #include "tests/rehearsal/judge_support.h"
 

@@ -75,7 +75,7 @@ TEST(Contact, OutsideTheEnvelopeItReboundsAtThreeTenthsOfTheSpeed) {
 
 TEST(Contact, ThrustAfterABounceDoesNotPenetrateThePort) {
     Scenario scenario = closing(0.2);
-    scenario.faults.push_back({Fault::Kind::thruster_stuck, 0, 1000, "+fx", {}});
+    scenario.faults.push_back({fault_kind("thruster_stuck"), 0, 1000, "+fx", {}});
     Simulation s = simulate(scenario);
     s.advance_to(ns(100));
     ASSERT_EQ(s.phase(), DynamicsPhase::bounced);
@@ -144,7 +144,7 @@ TEST(Ending, IsAtTheDurationOrWhenTheNavigationIsDoneOrHasLeft) {
 }
 
 TEST(Start, IsWhereTheScenarioHasIt) {
-    Scenario scenario = quiet(Orbit::Model::two_body);
+    Scenario scenario = quiet(orbit_model("two-body"));
     scenario.q_world_target = normalized(Quat{1, 2, 3, 4});
     scenario.target.T_body_port.q = normalized(Quat{1, 0, 1, 0});
     scenario.chaser.T_body_port.q = normalized(Quat{1, 1, 0, 0});

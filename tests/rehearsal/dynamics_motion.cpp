@@ -1,15 +1,14 @@
 // How bodies move by themselves: orbits, tumbling.
 #include "base/constants.h"
 #include "estimator/filter/motion_model.h"
-#include "rehearsal/dynamics/orbit_motion.h"
+#include "rehearsal/dynamics/rigid_body.h"
+#include "rehearsal/orbit/orbit.h"
 #include "tests/rehearsal/dynamics_support.h"
 
 namespace narpa::rehearsal {
 namespace {
 
-using Model = Orbit::Model;
-
-Orbit orbit_of(Model model) {
+Orbit orbit_of(const OrbitModel* model) {
     Orbit orbit;
     orbit.model = model;
     orbit.up = normalized(Vec3{1, 2, -1});
@@ -30,13 +29,13 @@ Vec3 position_in_lvlh(const Orbit& orbit, double t_s, const Translation& x) {
 }
 
 TEST(OrbitMotion, AFreeBodyFollowsItsVelocityAndAcceleration) {
-    const Translation x = propagated(orbit_of(Model::free), 5, 2, {0, 0, 1}, {{1, 2, 3}, {4, 5, 6}});
+    const Translation x = propagated(orbit_of(orbit_model("free")), 5, 2, {0, 0, 1}, {{1, 2, 3}, {4, 5, 6}});
     expect_near(x.position_m, {9, 12, 17}, 1e-12);
     expect_near(x.velocity_m_s, {4, 5, 8}, 1e-12);
 }
 
 TEST(OrbitMotion, ClohessyWiltshireClosesItsEllipseAfterAnOrbit) {
-    const Orbit orbit = orbit_of(Model::clohessy_wiltshire);
+    const Orbit orbit = orbit_of(orbit_model("clohessy-wiltshire"));
     const double n = orbit.rate_rad_s(), quarter = 0.25 * period_s(orbit);
     // No drift along the orbit where y' = -2 n x: an ellipse twice as long as it is high.
     const Translation start = from_lvlh(orbit, {100, 0, 30}, {0, -200 * n, 0});
@@ -47,7 +46,7 @@ TEST(OrbitMotion, ClohessyWiltshireClosesItsEllipseAfterAnOrbit) {
 }
 
 TEST(OrbitMotion, ClohessyWiltshireUnderThrustEqualsNumericalIntegration) {
-    const Orbit orbit = orbit_of(Model::clohessy_wiltshire);
+    const Orbit orbit = orbit_of(orbit_model("clohessy-wiltshire"));
     const double n = orbit.rate_rad_s(), dt_s = 600;
     const Vec3 push{1e-3, -2e-3, 5e-4};
     // In LVLH axes, which is where it is constant: given as it is in the middle of the time.
@@ -69,7 +68,7 @@ TEST(OrbitMotion, ClohessyWiltshireUnderThrustEqualsNumericalIntegration) {
 }
 
 TEST(OrbitMotion, TwoBodyOrbitClosesAndKeepsEnergyAndMomentum) {
-    const Orbit orbit = orbit_of(Model::two_body);
+    const Orbit orbit = orbit_of(orbit_model("two-body"));
     const double R = orbit.radius_m, mu = orbit.mu_m3_s2;
     // An ellipse with the same major axis comes back when the target does: at the same radius, as fast, but
     // steeper.
@@ -102,7 +101,7 @@ TEST(OrbitMotion, TwoBodyOrbitClosesAndKeepsEnergyAndMomentum) {
 }
 
 TEST(OrbitMotion, TwoBodyMotionKeepsMetresExactAtTheOrbitsRadius) {
-    const Orbit orbit = orbit_of(Model::two_body);
+    const Orbit orbit = orbit_of(orbit_model("two-body"));
     // On the target's own circle a metre ahead it stays a metre ahead: an arc of 1 / R.
     const double R = orbit.radius_m, n = orbit.rate_rad_s(), arc = 1 / R;
     const double back = 2 * R * std::sin(arc / 2) * std::sin(arc / 2);  // R (1 - cos)
@@ -115,7 +114,7 @@ TEST(OrbitMotion, TwoBodyMotionKeepsMetresExactAtTheOrbitsRadius) {
 }
 
 TEST(OrbitMotion, ClohessyWiltshireDiffersFromTwoBodiesByTheSquareOfTheDistance) {
-    const Orbit linear = orbit_of(Model::clohessy_wiltshire), full = orbit_of(Model::two_body);
+    const Orbit linear = orbit_of(orbit_model("clohessy-wiltshire")), full = orbit_of(orbit_model("two-body"));
     const auto difference_m = [&](double distance_m) {
         const Translation start = from_lvlh(full, {0.6 * distance_m, -0.8 * distance_m, 0.3 * distance_m}, {});
         return norm(propagated(full, 0, 900, {}, start).position_m -
@@ -127,7 +126,7 @@ TEST(OrbitMotion, ClohessyWiltshireDiffersFromTwoBodiesByTheSquareOfTheDistance)
 }
 
 TEST(OrbitMotion, TheAttractorsVelocityIsItsRateOfChange) {
-    const Orbit orbit = orbit_of(Model::two_body);
+    const Orbit orbit = orbit_of(orbit_model("two-body"));
     const Motion a = attractor_motion(orbit, {0, 1, 0, 0}, 99.5), b = attractor_motion(orbit, {0, 1, 0, 0}, 100.5);
     const Motion middle = attractor_motion(orbit, {0, 1, 0, 0}, 100);
     expect_near(b.T_world_body.t - a.T_world_body.t, middle.velocity_m_s, 1e-3);
@@ -181,7 +180,7 @@ TEST(RigidBody, TorqueChangesMomentumByTorqueTimesTime) {
 }
 
 TEST(TargetMotion, WithLvlhItRotatesAtTheOrbitsRatePlusItsOwn) {
-    Scenario s = quiet(Model::two_body);
+    Scenario s = quiet(orbit_model("two-body"));
     s.target_motion = {true, {0, 0.5, 0}};
     s.q_world_target = normalized(Quat{1, 0.2, -0.3, 0.4});
     Simulation simulation = simulate(s);
@@ -194,7 +193,7 @@ TEST(TargetMotion, WithLvlhItRotatesAtTheOrbitsRatePlusItsOwn) {
 }
 
 TEST(TargetMotion, WithoutLvlhItTumbles) {
-    Scenario s = quiet(Model::two_body);
+    Scenario s = quiet(orbit_model("two-body"));
     s.target_motion = {false, {0.5, 1, -0.2}};
     Simulation simulation = simulate(s);
     const Attitude start{s.q_world_target, kRadPerDeg * s.target_motion.rate_deg_s};
@@ -205,7 +204,7 @@ TEST(TargetMotion, WithoutLvlhItTumbles) {
 }
 
 TEST(TargetMotion, VelocitiesAreRatesOfChangeOfTheOrigins) {
-    Scenario s = quiet(Model::two_body);
+    Scenario s = quiet(orbit_model("two-body"));
     s.target_motion = {false, {0.5, 1, -0.2}};
     s.start.rate_deg_s = {1, -2, 3};
     s.start.velocity_m_s = {-0.1, 0.02, 0.05};

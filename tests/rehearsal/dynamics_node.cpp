@@ -167,7 +167,7 @@ ActuatorCommand hold(const PortState& p) {
 }
 
 Scenario dispersed() {
-    Scenario s = quiet(Orbit::Model::two_body);
+    Scenario s = quiet(orbit_model("two-body"));
     s.orbit.along = {0, 0, 1}, s.orbit.up = {0, 1, 0};
     s.target_motion = {true, {}};
     s.duration_s = 60;
@@ -228,7 +228,7 @@ TEST_F(DynamicsOnSlcan, TheSameSeedGivesTheSameBytes) {
 }
 
 TEST_F(DynamicsOnSlcan, EachPeriodSendsReportThenAttitudeThenPosesChaserLast) {
-    Scenario s = quiet(Orbit::Model::two_body);
+    Scenario s = quiet(orbit_model("two-body"));
     s.attractor = {"earth", 0x120};
     s.duration_s = 2;
     s.pose_rate_hz = 2;

@@ -11,7 +11,7 @@ namespace narpa::rehearsal {
 
 /// Two craft that face each other 60 m apart; nothing is drawn, nothing disturbs. The ports are off the centres of
 /// mass, and those off the bodies' origins.
-inline Scenario quiet(Orbit::Model model = Orbit::Model::free) {
+inline Scenario quiet(const OrbitModel* model = orbit_model("free")) {
     Scenario s;
     s.name = "quiet";
     s.orbit.model = model;

@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "protocols/can/candump.h"
+#include "rehearsal/report/run_report.h"
+#include "rehearsal/report/template.h"
 #include "tests/rehearsal/judge_support.h"
 #include "tests/support/temporary_folder.h"
 

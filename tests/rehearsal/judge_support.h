@@ -15,7 +15,7 @@ inline Scenario small_scenario() {
     Scenario s;
     s.name = "small";
     s.duration_s = 100;
-    s.orbit.model = Orbit::Model::free;
+    s.orbit.model = orbit_model("free");
     s.target = {"station", 0x110, {}, {{1, 0, 0, 0}, {2, 0.5, 0}}, 1000, Eigen::Matrix3d::Identity()};
     s.chaser = {"chaser", 0x100, {}, {{1, 0, 0, 0}, {1.5, 0, 0.25}}, 100, Eigen::Matrix3d::Identity()};
     s.legs.resize(2);

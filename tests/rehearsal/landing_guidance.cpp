@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/constants.h"
-#include "rehearsal/navigation/flight_control.h"
+#include "rehearsal/navigation/guidance/flight_control.h"
 #include "tests/support/paths.h"
 
 namespace narpa::rehearsal {

@@ -3,7 +3,7 @@
 #include <fstream>
 
 #include "base/time.h"
-#include "rehearsal/navigation/relative_motion.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 #include "tests/rehearsal/dynamics_support.h"
 #include "tests/support/temporary_folder.h"
 
@@ -13,7 +13,7 @@ namespace {
 /// Mars at 30 degrees north; the world's z is up, y north.
 Orbit mars() {
     Orbit o;
-    o.model = Orbit::Model::surface;
+    o.model = orbit_model("surface");
     o.radius_m = 3.39e6;
     o.mu_m3_s2 = 4.282837e13;
     o.up = {0, 0, 1};
@@ -102,7 +102,7 @@ TEST(GroundField, IsWhatTheFilterAndTheTruthFallIn) {
 }
 
 Scenario with_engine() {
-    Scenario s = quiet(Orbit::Model::surface);
+    Scenario s = quiet(orbit_model("surface"));
     s.orbit = mars();
     s.navigation.period_s = 0.5;
     s.engine = Engine{.group = 4, .least_n = 1000, .most_n = 5000, .gain_sigma = 0};
@@ -124,7 +124,7 @@ TEST(EngineModel, BurnsForThePeriodWithinItsLimitsAndIsOffAtZero) {
 
 TEST(EngineModel, AStuckThrottleGivesTheLeastForce) {
     Scenario s = with_engine();
-    s.faults.push_back({Fault::Kind::throttle_stuck, 0.2, 0.4, "", {}});
+    s.faults.push_back({fault_kind("throttle_stuck"), 0.2, 0.4, "", {}});
     ThrusterModel model(s, 1);
     ActuatorCommand command;
     command.impulse_n_s = {0, 0, 2000};

@@ -15,7 +15,7 @@ const std::string kLandings = test::build_path("scenes/rehearsal/");
 TEST(LandingScenario, ReadsTheLanding) {
     const auto s = read_scenario(kLandings + "landing.toml");
     ASSERT_TRUE(s) << s.error().text();
-    EXPECT_EQ(s->orbit.model, Orbit::Model::surface);
+    EXPECT_EQ(s->orbit.model, orbit_model("surface"));
     ASSERT_TRUE(s->engine);
     EXPECT_EQ(s->engine->axis(), 2);
     EXPECT_EQ(s->engine->sign(), 1);

@@ -7,8 +7,8 @@
 
 #include "rehearsal/contact/port_state.h"
 #include "rehearsal/dynamics/simulation.h"
-#include "rehearsal/navigation/guidance.h"
-#include "rehearsal/navigation/state_estimator.h"
+#include "rehearsal/navigation/estimation/state_estimator.h"
+#include "rehearsal/navigation/guidance/guidance.h"
 #include "tests/rehearsal/navigation_plant.h"
 
 namespace narpa::rehearsal {

@@ -120,7 +120,7 @@ TEST(NavigationLoop, RetreatsAfterABounce) {
 TEST(NavigationLoop, AbortsOffTheReference) {
     Scenario s = docking_scenario();
     Fault fault;
-    fault.kind = Fault::Kind::commands_lost;
+    fault.kind = fault_kind("commands_lost");
     fault.from_s = 50;
     s.faults = {fault};
     s.navigation.abort_off_m = 2;

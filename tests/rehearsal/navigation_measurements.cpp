@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
-#include "rehearsal/navigation/measurements.h"
+#include "rehearsal/navigation/estimation/measurements.h"
 #include "rehearsal/navigation/sensor_inputs.h"
 #include "tests/rehearsal/simulated_sensors.h"
 #include "tests/support/paths.h"

@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "rehearsal/navigation/flight_control.h"
+#include "rehearsal/navigation/guidance/flight_control.h"
 #include "tests/support/paths.h"
 
 namespace narpa::rehearsal {

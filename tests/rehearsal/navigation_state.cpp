@@ -6,8 +6,8 @@
 #include <random>
 
 #include "protocols/lidar/velodyne.h"
+#include "rehearsal/navigation/estimation/state_estimator.h"
 #include "rehearsal/navigation/sensor_inputs.h"
-#include "rehearsal/navigation/state_estimator.h"
 #include "tests/rehearsal/navigation_plant.h"
 #include "tests/rehearsal/simulated_sensors.h"
 

@@ -3,8 +3,8 @@
 
 #include <fstream>
 
+#include "rehearsal/report/run_report.h"
 #include "rehearsal/runner/campaign.h"
-#include "rehearsal/runner/report.h"
 #include "tests/rehearsal/judge_support.h"
 #include "tests/rehearsal/markup.h"
 #include "tests/support/temporary_folder.h"
@@ -19,7 +19,7 @@ Scenario full_scenario() {
     s.gates.keep_out_m = 5;
     s.gates.navigation = Gates::NavigationError{};
     s.gates.contact = CaptureEnvelope{};
-    s.faults.push_back({Fault::Kind::thruster_off, 3, 5, "+fx", {}});
+    s.faults.push_back({fault_kind("thruster_off"), 3, 5, "+fx", {}});
     return s;
 }
 
@@ -102,15 +102,15 @@ TEST(Charts, HaveWhatWasOnTheBus) {
 }
 
 TEST(Charts, BecomePartOfThePage) {
-    const std::initializer_list<PageChart> kRates{{"range", "Range over time"}, {"rates", "Rates over time"}};
+    const Scenario s = full_scenario();
     const test::TemporaryFolder folder;
-    EXPECT_NE(charts_of(folder / "", kRates).find("narpa-plot charts.json"), std::string::npos);
+    EXPECT_NE(page_of(s, Messages(s), folder / "").find("narpa-plot charts.json"), std::string::npos);
     std::filesystem::create_directory(folder / "charts");
     std::ofstream(folder / "charts/range.svg") << "foobar";
-    const std::string html = charts_of(folder / "", kRates);
+    const std::string html = page_of(s, Messages(s), folder / "");
     EXPECT_EQ(markup_error(html), "");
     EXPECT_NE(html.find("alt=\"Range over time\" src=\"data:image/svg+xml;base64,Zm9vYmFy\""), std::string::npos);
-    EXPECT_EQ(html.find("Rates"), std::string::npos) << "what was not drawn";
+    EXPECT_EQ(html.find("alt=\"Rates"), std::string::npos) << "what was not drawn";
 }
 
 RunResult run_of(std::size_t k, const Scenario& s, const Messages& m) {

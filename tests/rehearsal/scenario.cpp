@@ -44,7 +44,7 @@ TEST(Scenario, ReadsTheDocking) {
     EXPECT_EQ(s->chaser.can_id, 0x100u);
     ASSERT_TRUE(s->attractor);
     EXPECT_EQ(s->attractor->second, 0x120u);
-    EXPECT_EQ(s->orbit.model, Orbit::Model::two_body);
+    EXPECT_EQ(s->orbit.model, orbit_model("two-body"));
     EXPECT_NEAR(s->orbit.rate_rad_s(), 2 * 3.14159265358979 / 5553.6, 1e-7);
     ASSERT_EQ(s->legs.size(), 3u);
     EXPECT_TRUE(s->legs.back().contact);

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/state_estimator.h - the navigation filter with pose measurements and thruster commands as
-/// inputs: converts between the bodies' axes and the filter's centres of mass.
+/// rehearsal/navigation/estimation/state_estimator.h - the navigation filter with pose measurements and thruster
+/// commands as inputs: converts between the bodies' axes and the filter's centres of mass.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 #include "estimator/filter/pose_filter.h"
 #include "estimator/pose/apparent_motion.h"
 #include "protocols/closed_loop.h"
-#include "rehearsal/navigation/flight_control.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 
 namespace narpa::rehearsal {
 
@@ -143,6 +143,7 @@ private:
           mass_kg_(scenario.chaser.mass_kg) {}
     [[nodiscard]] const PoseFilter& filter() const noexcept { return tracker_.filter(); }
     [[nodiscard]] Quat q_frame_chaser(std::int64_t t_ns) const;
+    void restart_at(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vector12& more);
     [[nodiscard]] Matrix6 covariance_of_model(const Rigid3& T_chaser_target) const;
     void correlate(const Matrix12& before, double share);
     [[nodiscard]] Eigen::Matrix<double, 12, 3> by_star_tracker(double sigma_rad) const;

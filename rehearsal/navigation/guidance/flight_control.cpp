@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/flight_control.h"
+#include "rehearsal/navigation/guidance/flight_control.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,8 @@
-#include "rehearsal/dynamics/orbit_motion.h"
+#include "rehearsal/orbit/orbit.h"
 
-#include <Eigen/Geometry>
-#include <Eigen/LU>
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "estimator/filter/motion_model.h"
@@ -11,10 +12,6 @@ namespace narpa::rehearsal {
 namespace {
 
 constexpr double kLongestStepS = 1;
-
-Translation free_motion(double dt, const Vec3& a, const Translation& x) {
-    return {x.position_m + dt * x.velocity_m_s + (0.5 * dt * dt) * a, x.velocity_m_s + dt * a};
-}
 
 /// Motion from rest at the origin under the constant acceleration a, LVLH axes.
 Translation clohessy_wiltshire_push(double n, double t, const Vec3& a) {
@@ -86,17 +83,68 @@ Translation in_steps(const Step& step, const Orbit& orbit, double t, double dt, 
     return x;
 }
 
+/// Of a circular orbit.
+double circular_rate_rad_s(const Orbit& orbit) {
+    return std::sqrt(orbit.mu_m3_s2 / (orbit.radius_m * orbit.radius_m * orbit.radius_m));
+}
+
+constexpr std::array<OrbitModel, 4> kModels{{
+    {"free", "no attractor: the world is inertial, and so is \"LVLH\"", false, false,
+     [](const Orbit&) { return 0.0; },
+     [](const Orbit&, double, double dt, const Vec3& a, const Translation& x) {
+         return Translation{x.position_m + dt * x.velocity_m_s + (0.5 * dt * dt) * a, x.velocity_m_s + dt * a};
+     }},
+    {"clohessy-wiltshire", "linear, about a circular orbit", true, false, circular_rate_rad_s, clohessy_wiltshire},
+    {"two-body", "both bodies about a point mass", true, false, circular_rate_rad_s,
+     [](const Orbit& o, double t, double dt, const Vec3& a, const Translation& x) {
+         return in_steps(two_body_step, o, t, dt, a, x);
+     }},
+    {"surface", "the target is ground of a rotating planet", false, true,
+     [](const Orbit& o) { return o.rotation_rad_s; },
+     [](const Orbit& o, double t, double dt, const Vec3& a, const Translation& x) {
+         return in_steps(surface_step, o, t, dt, a, x);
+     }},
+}};
+
 }  // namespace
+
+std::span<const OrbitModel> orbit_models() {
+    return kModels;
+}
+
+const OrbitModel* orbit_model(std::string_view name) {
+    const auto model = std::ranges::find(kModels, name, &OrbitModel::name);
+    return model == kModels.end() ? nullptr : &*model;
+}
+
+Quat Orbit::q_world_frame(double t_s) const {
+    Vec3 x = normalized(up), z = normalized(axis);
+    if (model->over_ground) {
+        x = up - dot(up, z) * z;  // direction of the ground site
+        if (norm(x) < 1e-9) x = cross(z, std::abs(z.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0});  // at a pole: any
+        x = normalized(x);
+    } else {
+        z = normalized(cross(x, along));
+    }
+    return quat_from_columns(x, cross(z, x), z) * exp_rotation({0, 0, rate_rad_s() * t_s});
+}
+
+Vec3 Orbit::gravity_m_s2(const Vec3& from_centre_m, const Vec3& unit_axis) const {
+    const double r = norm(from_centre_m), sine = dot(from_centre_m, unit_axis) / r;
+    const double j = 1.5 * j2 * (equatorial_radius_m / r) * (equatorial_radius_m / r);
+    const Vec3 out = from_centre_m / r;
+    return (-mu_m3_s2 / (r * r)) * ((1 + j * (1 - 5 * sine * sine)) * out + (2 * j * sine) * unit_axis);
+}
+
+Vec3 Orbit::relative_free_fall_m_s2(double t_s, const Vec3& position_m) const {
+    const Quat turned = q_world_frame(t_s) * conjugate(q_world_frame(0));
+    const Vec3 z = normalized(axis), ground = radius_m * (turned * normalized(up)), rate = rotation_rad_s * z;
+    return gravity_m_s2(ground + position_m, z) - cross(rate, cross(rate, ground));
+}
 
 Translation propagated(const Orbit& orbit, double t_s, double dt_s, const Vec3& acceleration_m_s2,
                        const Translation& from) {
-    switch (orbit.model) {
-        case Orbit::Model::free: break;
-        case Orbit::Model::clohessy_wiltshire: return clohessy_wiltshire(orbit, t_s, dt_s, acceleration_m_s2, from);
-        case Orbit::Model::two_body: return in_steps(two_body_step, orbit, t_s, dt_s, acceleration_m_s2, from);
-        case Orbit::Model::surface: return in_steps(surface_step, orbit, t_s, dt_s, acceleration_m_s2, from);
-    }
-    return free_motion(dt_s, acceleration_m_s2, from);
+    return orbit.model->propagated(orbit, t_s, dt_s, acceleration_m_s2, from);
 }
 
 Motion attractor_motion(const Orbit& orbit, const Quat& q_world_attractor, double t_s) {
@@ -104,29 +152,6 @@ Motion attractor_motion(const Orbit& orbit, const Quat& q_world_attractor, doubl
     return {{q_world_attractor, q_world_frame * Vec3{-orbit.radius_m, 0, 0}},
             q_world_frame * Vec3{0, -orbit.radius_m * orbit.rate_rad_s(), 0},
             {}};
-}
-
-namespace {
-
-constexpr double kLargestTurnRad = 0.005;
-
-}  // namespace
-
-RigidBody::RigidBody(const Eigen::Matrix3d& inertia_kg_m2)
-    : inertia_(inertia_kg_m2), inverse_(inertia_kg_m2.inverse()) {}
-
-Attitude RigidBody::turned(Attitude from, const Vec3& torque_n_m, double dt_s) const {
-    const Eigen::Vector3d torque = to_eigen(torque_n_m);
-    Eigen::Vector3d w = to_eigen(from.rate_rad_s);
-    const double turn_rad = w.norm() * dt_s + 0.5 * (inverse_ * torque).norm() * dt_s * dt_s;
-    const int steps = 1 + static_cast<int>(turn_rad / kLargestTurnRad);
-    const double h = dt_s / steps;
-    for (int i = 0; i < steps; ++i) {
-        const RotationStep step = rotation_step(inertia_, inverse_, torque, w, h);
-        from.q_world_body = from.q_world_body * exp_rotation(to_vec3(step.turn_rad));
-        w = step.rate_rad_s;
-    }
-    return {normalized(from.q_world_body), to_vec3(w)};
 }
 
 }  // namespace narpa::rehearsal

@@ -1,10 +1,11 @@
-/// rehearsal/navigation/flight_control.h - feedback control of the chaser's port to the reference, and thrust
-/// allocation. A chaser with an engine tilts it to the direction of the force; thrusters add the rest across it.
+/// rehearsal/navigation/guidance/flight_control.h - feedback control of the chaser's port to the reference, and
+/// thrust allocation. A chaser with an engine tilts it to the direction of the force; thrusters add the rest across
+/// it.
 #pragma once
 
 #include <array>
 
-#include "rehearsal/navigation/guidance.h"
+#include "rehearsal/navigation/guidance/guidance.h"
 
 namespace narpa::rehearsal {
 

@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/scene_model.h"
+#include "rehearsal/navigation/estimation/scene_model.h"
 
 #include <algorithm>
 #include <variant>

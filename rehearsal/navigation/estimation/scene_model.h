@@ -1,5 +1,5 @@
-/// rehearsal/navigation/scene_model.h - the navigation's model of what its sensors see: the scene with the target
-/// at its estimated pose.
+/// rehearsal/navigation/estimation/scene_model.h - the navigation's model of what its sensors see: the scene with
+/// the target at its estimated pose.
 #pragma once
 
 #include <memory>

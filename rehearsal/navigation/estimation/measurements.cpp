@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/measurements.h"
+#include "rehearsal/navigation/estimation/measurements.h"
 
 #include <fmt/format.h>
 

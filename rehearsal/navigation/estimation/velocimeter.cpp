@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/velocimeter.h"
+#include "rehearsal/navigation/estimation/velocimeter.h"
 
 #include <algorithm>
 #include <array>

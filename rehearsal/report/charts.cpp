@@ -1,28 +1,30 @@
 // The plot documents of the reports.
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "base/base64.h"
 #include "plot/plot.h"
-#include "rehearsal/runner/report.h"
+#include "rehearsal/report/run_report.h"
+#include "rehearsal/runner/child_process.h"
 
 namespace narpa::rehearsal {
 namespace {
 
 using nlohmann::json;
 
-json of(const Vec3& v) {
+json to_json(const Vec3& v) {
     return {v.x, v.y, v.z};
 }
 
-/// One array per key, with a value from each sample.
-template <class Sample>
-json columns(const std::vector<Sample>& samples,
-             std::initializer_list<std::pair<const char*, json (*)(const Sample&)>> values) {
-    json out;
-    for (const auto& [key, value] : values) {
-        json& column = out[key] = json::array();
-        for (const Sample& s : samples) column.push_back(value(s));
-    }
+/// The value of each sample.
+json column(const auto& samples, const auto& value) {
+    json out = json::array();
+    for (const auto& s : samples) out.push_back(value(s));
     return out;
+}
+template <class Sample>
+json column(const std::vector<Sample>& samples, Vec3 Sample::*vector) {
+    return column(samples, [&](const Sample& s) { return to_json(s.*vector); });
 }
 
 json times(const BusRecord& bus, const auto& samples, auto counts) {
@@ -33,22 +35,21 @@ json times(const BusRecord& bus, const auto& samples, auto counts) {
 }
 constexpr auto kAll = [](const auto&) { return true; };
 
-json of_estimates(const BusRecord& bus) {
+json estimates_over_time(const BusRecord& bus) {
     using E = JudgedEstimate;
-    json out =
-        columns<E>(bus.estimates, {{"port_position_m", [](const E& e) { return of(e.port_position_m); }},
-                                   {"position_error_m", [](const E& e) { return of(e.position_error_m); }},
-                                   {"position_sigma_m", [](const E& e) { return of(e.sigma_position_m); }},
-                                   {"attitude_error_rad", [](const E& e) { return of(e.rotation_error_rad); }},
-                                   {"attitude_sigma_rad", [](const E& e) { return of(e.sigma_rotation_rad); }}});
-    out["t_s"] = times(bus, bus.estimates, kAll);
-    out["frame_times_s"] = times(bus, bus.estimates, [](const E& e) { return e.frames > 0; });
-    out["sweep_times_s"] = times(bus, bus.estimates, [](const E& e) { return e.sweeps > 0; });
-    return out;
+    const auto& all = bus.estimates;
+    return {{"t_s", times(bus, all, kAll)},
+            {"frame_times_s", times(bus, all, [](const E& e) { return e.frames > 0; })},
+            {"sweep_times_s", times(bus, all, [](const E& e) { return e.sweeps > 0; })},
+            {"port_position_m", column(all, &E::port_position_m)},
+            {"position_error_m", column(all, &E::position_error_m)},
+            {"position_sigma_m", column(all, &E::sigma_position_m)},
+            {"attitude_error_rad", column(all, &E::rotation_error_rad)},
+            {"attitude_sigma_rad", column(all, &E::sigma_rotation_rad)}};
 }
 
 /// Intervals of commands with the same phase and leg.
-json of_phases(const BusRecord& bus) {
+json phases_over_time(const BusRecord& bus) {
     json out = json::array();
     const auto& commands = bus.commands;
     for (std::size_t i = 0; i < commands.size();) {
@@ -64,7 +65,7 @@ json of_phases(const BusRecord& bus) {
     return out;
 }
 
-json of_limits(const CaptureEnvelope& c) {
+json to_json(const CaptureEnvelope& c) {
     return {{"lateral_m", c.lateral_m},
             {"closing_m_s", {c.closing_min_m_s, c.closing_max_m_s}},
             {"lateral_m_s", c.lateral_rate_m_s},
@@ -72,15 +73,14 @@ json of_limits(const CaptureEnvelope& c) {
             {"roll_deg", c.roll_deg}};
 }
 
-json of_limits(const LandingLimits& l) {
-    return {{"from_site_m", l.from_site_m},
-            {"vertical_m_s", l.vertical_m_s},
-            {"horizontal_m_s", l.horizontal_m_s},
-            {"tilt_deg", l.tilt_deg},
-            {"rate_deg_s", l.rate_deg_s}};
+json to_json(const LandingLimits& limits) {
+    json out;
+    for (const LandingLimit& l : landing_limits())
+        if (!l.of_ground) out[l.key] = limits.*l.max;
+    return out;
 }
 
-json of_gates(const Gates& g) {
+json to_json(const Gates& g) {
     json out{{"corridor", nullptr}, {"keep_out_m", nullptr}, {"distance_m", nullptr}, {"contact", nullptr}};
     if (g.corridor)
         out["corridor"] = {{"half_angle_deg", g.corridor->half_angle_deg},
@@ -88,25 +88,24 @@ json of_gates(const Gates& g) {
                            {"from_m", g.corridor->from_m}};
     if (g.keep_out_m) out["keep_out_m"] = *g.keep_out_m;
     if (g.distance_m) out["distance_m"] = {g.distance_m->first, g.distance_m->second};
-    if (g.contact) out["contact"] = of_limits(*g.contact);
+    if (g.contact) out["contact"] = to_json(*g.contact);
     return out;
 }
 
 /// The navigation's commands in each period, in the chaser's body axes, and the accumulated change of speed.
-json of_thrusters(const Scenario& scenario, const BusRecord& bus) {
+json thrusters_over_time(const Scenario& scenario, const BusRecord& bus) {
     using C = ActuatorCommand;
-    json out = columns<C>(bus.commands,
-                          {{"impulse_n_s", [](const C& c) { return of(c.impulse_n_s); }},
-                           {"angular_impulse_n_m_s", [](const C& c) { return of(c.angular_impulse_n_m_s); }}});
-    out["t_s"] = times(bus, bus.commands, kAll);
-    json& delta_v = out["delta_v_m_s"] = json::array();
     double sum = 0;
-    for (const C& c : bus.commands) delta_v.push_back(sum += norm(c.impulse_n_s) / scenario.chaser.mass_kg);
-    return out;
+    return {{"t_s", times(bus, bus.commands, kAll)},
+            {"impulse_n_s", column(bus.commands, &C::impulse_n_s)},
+            {"angular_impulse_n_m_s", column(bus.commands, &C::angular_impulse_n_m_s)},
+            {"delta_v_m_s", column(bus.commands, [&](const C& c) {
+                 return sum += norm(c.impulse_n_s) / scenario.chaser.mass_kg;
+             })}};
 }
 
 /// Latency from the pose command to the hand-over; none in lockstep, where the clock waits.
-json of_latency(const BusRecord& bus, bool lockstep) {
+json latency_over_time(const BusRecord& bus, bool lockstep) {
     json t = json::array(), ms = json::array();
     for (const FrameLedger& f : bus.ledgers)
         if (f.t_hand_over_ns != 0 && !lockstep) {
@@ -120,30 +119,30 @@ json of_latency(const BusRecord& bus, bool lockstep) {
 
 json rehearsal_plot(const Scenario& scenario, const BusRecord& bus, const Verdict& verdict) {
     using S = TruthState;
-    json truth = columns<S>(bus.truth, {{"position_m", [](const S& s) { return of(s.position_m()); }},
-                                        {"range_m", [](const S& s) { return json(s.range_m()); }},
-                                        {"closing_m_s", [](const S& s) { return json(s.closing_m_s()); }},
-                                        {"lateral_m_s", [](const S& s) { return json(s.lateral_m_s()); }}});
-    truth["t_s"] = times(bus, bus.truth, kAll);
+    const json truth = {{"t_s", times(bus, bus.truth, kAll)},
+                        {"position_m", column(bus.truth, [](const S& s) { return to_json(s.position_m()); })},
+                        {"range_m", column(bus.truth, [](const S& s) { return s.range_m(); })},
+                        {"closing_m_s", column(bus.truth, [](const S& s) { return s.closing_m_s(); })},
+                        {"lateral_m_s", column(bus.truth, [](const S& s) { return s.lateral_m_s(); })}};
     json holds = json::array(), contact;
     for (const Leg& leg : scenario.legs)
-        if (!leg.arc_deg && !leg.contact) holds.push_back(of(leg.to_m));
+        if (!leg.arc_deg && !leg.contact) holds.push_back(to_json(leg.to_m));
     if (verdict.contact)
         contact = {{"t_s", verdict.contact->t_s},
                    {"captured", verdict.contact->captured},
-                   {"position_m", of(verdict.contact->state.position_m())}};
+                   {"position_m", to_json(verdict.contact->state.position_m())}};
     json document = {{"plot", "rehearsal"},
                      {"title", scenario.title},
                      {"t_end_s", verdict.t_end_s},
                      {"truth", truth},
-                     {"estimates", of_estimates(bus)},
-                     {"thrusters", of_thrusters(scenario, bus)},
+                     {"estimates", estimates_over_time(bus)},
+                     {"thrusters", thrusters_over_time(scenario, bus)},
                      {"holds_m", holds},
-                     {"phases", of_phases(bus)},
-                     {"gates", of_gates(scenario.gates)},
+                     {"phases", phases_over_time(bus)},
+                     {"gates", to_json(scenario.gates)},
                      {"contact", contact},
-                     {"latency", of_latency(bus, verdict.lockstep)}};
-    if (scenario.gear) document["landing"] = of_limits(scenario.gates.landing.value_or(LandingLimits{}));
+                     {"latency", latency_over_time(bus, verdict.lockstep)}};
+    if (scenario.gear) document["landing"] = to_json(scenario.gates.landing.value_or(LandingLimits{}));
     return document;
 }
 
@@ -163,16 +162,25 @@ json campaign_plot(const Scenario& scenario, std::span<const json> contacts) {
     if (scenario.gear)
         return {{"plot", "campaign"},
                 {"title", scenario.title},
-                {"landing", of_limits(scenario.gates.landing.value_or(LandingLimits{}))},
+                {"landing", to_json(scenario.gates.landing.value_or(LandingLimits{}))},
                 {"runs", runs}};
     return {{"plot", "campaign"},
             {"title", scenario.title},
-            {"limits", of_limits(scenario.gates.contact.value_or(CaptureEnvelope{}))},
+            {"limits", to_json(scenario.gates.contact.value_or(CaptureEnvelope{}))},
             {"runs", runs}};
 }
 
 Status draw_charts(const std::string& folder, const json& document) {
     return write_plot(folder + "/charts", document);
+}
+
+json drawn_charts(const std::string& folder) {
+    json out = json::object();
+    std::error_code none;
+    for (const auto& entry : std::filesystem::directory_iterator(folder + "/charts", none))
+        if (const auto& path = entry.path(); path.extension() == ".svg")
+            out[path.stem().string()] = base64(read_text(path.string()));
+    return out;
 }
 
 }  // namespace narpa::rehearsal

@@ -1,5 +1,5 @@
-/// rehearsal/navigation/relative_motion.h - the relative state in the three forms that navigation uses: the
-/// filter's (LVLH), inertial axes, and port to port.
+/// rehearsal/navigation/estimation/relative_motion.h - the relative state in the three forms that navigation uses:
+/// the filter's (LVLH), inertial axes, and port to port.
 #pragma once
 
 #include "estimator/filter/motion_model.h"

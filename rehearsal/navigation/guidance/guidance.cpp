@@ -1,6 +1,7 @@
-#include "rehearsal/navigation/guidance.h"
+#include "rehearsal/navigation/guidance/guidance.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "estimator/pose/pose_estimate.h"
@@ -67,6 +68,7 @@ Vec3 LegPath::velocity_m_s(double t_s) const {
 DescentPath::DescentPath(const Vec3& from_m, const Vec3& from_m_s, const Vec3& to_m, const Vec3& to_m_s,
                          double to_go_s)
     : to_m_(to_m), to_m_s_(to_m_s) {
+    assert(to_go_s > 0);
     const double t = -to_go_s;
     const Vec3 position = from_m - to_m - t * to_m_s, velocity = from_m_s - to_m_s;
     // position = jerk t^3 / 6 + snap t^4 / 24, velocity = jerk t^2 / 2 + snap t^3 / 6
@@ -147,6 +149,7 @@ Guidance::Guidance(const Scenario& scenario, double t_s)
 }
 
 void Guidance::begin_leg(const Vec3& from_m, double t_s) {
+    assert(leg_ < legs_.size());
     const Leg& leg = legs_[leg_];
     path_ = LegPath::along(leg, from_m, kShareOfThrust * thrust_m_s2_);
     if (leg.contact && leg_ > 0 && legs_[leg_ - 1].descent_s) {

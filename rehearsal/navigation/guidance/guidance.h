@@ -1,11 +1,11 @@
-/// rehearsal/navigation/guidance.h - the reference trajectory of the chaser's port: along the scenario's legs, to
-/// contact, in powered descent, or in retreat.
+/// rehearsal/navigation/guidance/guidance.h - the reference trajectory of the chaser's port: along the scenario's
+/// legs, to contact, in powered descent, or in retreat.
 #pragma once
 
 #include <vector>
 
 #include "protocols/closed_loop.h"
-#include "rehearsal/navigation/relative_motion.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 #include "rehearsal/scenario/scenario.h"
 
 namespace narpa::rehearsal {

@@ -1,9 +1,10 @@
-#include "rehearsal/navigation/state_estimator.h"
+#include "rehearsal/navigation/estimation/state_estimator.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 
 #include "estimator/uncertainty/root_information.h"
@@ -21,6 +22,7 @@ bool AttitudeTrack::take(const AttitudeReport& report) noexcept {
 }
 
 AttitudeTrack::At AttitudeTrack::at(std::int64_t t_ns) const noexcept {
+    assert(!empty());
     std::size_t after = 0;
     while (after < count_ && reports_[after].t_ns < t_ns) ++after;
     if (after > 0 && after < count_) {
@@ -97,7 +99,7 @@ FilterSettings filter_settings(const Scenario& s) {
     FilterSettings f;
     f.history = kHistory;
     f.motion.orbit_rate_rad_s = s.orbit.rate_rad_s();
-    if (s.orbit.model == Orbit::Model::surface) f.motion.ground = ground_field(s.orbit);
+    if (s.orbit.model->over_ground) f.motion.ground = ground_field(s.orbit);
     if (!s.target_motion.with_lvlh) f.motion.inertia_kg_m2 = s.target.inertia_kg_m2;
     f.motion.acceleration_psd = s.navigation.acceleration_psd;
     f.motion.angular_acceleration_psd = s.navigation.angular_acceleration_psd;
@@ -111,8 +113,7 @@ Matrix12 first_covariance(const Scenario& s, const RelativeMotion& motion) {
     Matrix12 P = Matrix12::Zero();
     P.block<3, 3>(0, 0) = spread(q_frame_port, s.start.position_sigma_m, kMinPosition_m);
     P.block<3, 3>(3, 3) = spread(q_frame_port, s.start.velocity_sigma_m_s, kMinVelocity_m_s);
-    if (s.orbit.model ==
-        Orbit::Model::surface) {  // the planet's rotation is known; the chaser's attitude is measured
+    if (s.orbit.model->over_ground) {  // the planet's rotation is known; the chaser's attitude is measured
         P.block<3, 3>(6, 6) = kGroundAttitude_rad * kGroundAttitude_rad * Eigen::Matrix3d::Identity();
         P.block<3, 3>(9, 9) = kGroundRate_rad_s * kGroundRate_rad_s * Eigen::Matrix3d::Identity();
         return 0.5 * (P + P.transpose());
@@ -219,36 +220,35 @@ void StateEstimator::advance(std::int64_t t_ns) {
     tracker_.filter().predict(t_ns);
 }
 
-void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
-    advance(t_ns);
+/// Restarts the filter with the chaser's port at this place and velocity, and with `more` added to its covariance
+/// (standard deviations).
+void StateEstimator::restart_at(const Vec3& port_m, const Vec3& port_velocity_m_s, const Vector12& more) {
     pulses_.clear();
     by_star_tracker_.setZero();
     RelativeMotion m = motion();
-    const PortState port = port_state(m, scenario_.target, scenario_.chaser);
-    const Vec3 at = port.T_port_chaser_port.t, along = port.velocity_m_s;
-    place_port({held ? 0 : at.x, at.y, at.z}, held ? Vec3{} : Vec3{0, along.y, along.z}, scenario_.target,
-               scenario_.chaser, m);
+    place_port(port_m, port_velocity_m_s, scenario_.target, scenario_.chaser, m);
+    const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
+    // If that fails, the filter stays unchanged.
+    (void)tracker_.start(t_ns(), in_frame(m, scenario_.orbit, t_s(t_ns())), covariance);
+}
+
+void StateEstimator::on_contact(std::int64_t t_ns, bool held) {
+    advance(t_ns);
+    const PortState port = port_state(motion(), scenario_.target, scenario_.chaser);
+    const Vec3 at = port.position_m(), along = port.velocity_m_s;
     Vector12 more;
     more << Eigen::Vector3d::Constant(kMetPosition_m),
         Eigen::Vector3d::Constant(held ? kHeldVelocity_m_s : kBouncedVelocity_m_s),
         Eigen::Vector3d::Constant(kMetAttitude_rad), Eigen::Vector3d::Constant(kMetRate_rad_s);
-    const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
-    // If that fails, the filter stays unchanged.
-    (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
+    restart_at({held ? 0 : at.x, at.y, at.z}, held ? Vec3{} : Vec3{0, along.y, along.z}, more);
 }
 
 void StateEstimator::on_touchdown(std::int64_t t_ns) {
     advance(t_ns);
-    pulses_.clear();
-    by_star_tracker_.setZero();
-    RelativeMotion m = motion();
-    const Vec3 at = port_state(m, scenario_.target, scenario_.chaser).position_m();
-    place_port(at, {}, scenario_.target, scenario_.chaser, m);
     Vector12 more = Vector12::Zero();
     more.segment<3>(0).setConstant(kMetPosition_m);
     more.segment<3>(3).setConstant(kBouncedVelocity_m_s);
-    const Matrix12 covariance = filter().covariance() + Matrix12(more.cwiseAbs2().asDiagonal());
-    (void)tracker_.start(this->t_ns(), in_frame(m, scenario_.orbit, t_s(this->t_ns())), covariance);
+    restart_at(port_state(motion(), scenario_.target, scenario_.chaser).position_m(), {}, more);
     // The ground compensates gravity.
     tracker_.filter().accelerate(this->t_ns(), ground_field(scenario_.orbit).gravity_m_s2);
     resting_ = true;
@@ -308,8 +308,7 @@ std::optional<UpdateResult> StateEstimator::take(const TargetVelocity& v) {
     const AttitudeTrack::At chaser = attitude_.at(v.t_ns);
     const Vec3 origin = v.origin_m - scenario_.chaser.centre_of_mass_m;
     // The star tracker's error rotates the beam; over ground this adds a part of the velocity across the beam.
-    const double across_m_s =
-        scenario_.orbit.model == Orbit::Model::surface ? norm(filter().state().velocity_m_s) : 0;
+    const double across_m_s = scenario_.orbit.model->over_ground ? norm(filter().state().velocity_m_s) : 0;
     return tracker_.update(BeamVelocity{
         .t_ns = v.t_ns,
         .origin_m = origin,

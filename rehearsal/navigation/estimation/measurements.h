@@ -1,4 +1,5 @@
-/// rehearsal/navigation/measurements.h - pose measurements of the target from camera frames and LiDAR sweeps.
+/// rehearsal/navigation/estimation/measurements.h - pose measurements of the target from camera frames and LiDAR
+/// sweeps.
 #pragma once
 
 #include <memory>
@@ -8,8 +9,8 @@
 
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/method/camera_method.h"
-#include "rehearsal/navigation/scene_model.h"
-#include "rehearsal/navigation/state_estimator.h"
+#include "rehearsal/navigation/estimation/scene_model.h"
+#include "rehearsal/navigation/estimation/state_estimator.h"
 
 namespace narpa::rehearsal {
 

@@ -1,4 +1,4 @@
-#include "rehearsal/navigation/relative_motion.h"
+#include "rehearsal/navigation/estimation/relative_motion.h"
 
 #include <cmath>
 
@@ -79,7 +79,7 @@ GroundField ground_field(const Orbit& orbit) {
 }
 
 Vec3 gravity_difference_m_s2(const Orbit& orbit, double t_s, const Vec3& position_m) {
-    if (orbit.model == Orbit::Model::surface) return orbit.relative_free_fall_m_s2(t_s, position_m);
+    if (orbit.model->over_ground) return orbit.relative_free_fall_m_s2(t_s, position_m);
     const double n = orbit.rate_rad_s();
     const Vec3 up = orbit.q_world_frame(t_s) * Vec3{1, 0, 0};
     return n * n * (3 * dot(position_m, up) * up - position_m);

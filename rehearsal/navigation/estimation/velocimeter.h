@@ -1,13 +1,13 @@
-/// rehearsal/navigation/velocimeter.h - velocities along the beams of a Doppler LiDAR, and over ground their
-/// ranges, as received over CAN.
+/// rehearsal/navigation/estimation/velocimeter.h - velocities along the beams of a Doppler LiDAR, and over ground
+/// their ranges, as received over CAN.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "protocols/lidar_beam.h"
-#include "rehearsal/navigation/scene_model.h"
-#include "rehearsal/navigation/state_estimator.h"
+#include "rehearsal/navigation/estimation/scene_model.h"
+#include "rehearsal/navigation/estimation/state_estimator.h"
 
 namespace narpa::rehearsal {
 

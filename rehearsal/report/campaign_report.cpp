@@ -1,11 +1,12 @@
-// The summary of a campaign as JSON, JUnit and HTML.
+#include "rehearsal/report/campaign_report.h"
+
 #include <fmt/format.h>
 
 #include <map>
 
 #include "rehearsal/judge/verdict.h"
-#include "rehearsal/runner/campaign.h"
-#include "rehearsal/runner/report.h"
+#include "rehearsal/report/run_report.h"
+#include "rehearsal/report/template.h"
 
 namespace narpa::rehearsal {
 
@@ -111,26 +112,18 @@ json summarise(const Scenario& scenario, const std::vector<RunResult>& runs) {
 }
 
 std::string campaign_junit(const std::string& suite, const std::vector<RunResult>& runs) {
-    std::size_t failed = 0, missing = 0;
-    for (const RunResult& run : runs)
-        failed += !passed(run) && !run.result.is_null(), missing += run.result.is_null();
-    std::string out =
-        fmt::format("  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\">\n",
-                    escape(suite), runs.size(), failed, missing);
+    json cases = json::array();
     for (const RunResult& run : runs) {
-        out +=
-            fmt::format("    <testcase classname=\"{}\" name=\"run {} seed {}\"", escape(suite), run.run, run.seed);
-        if (run.result.is_null()) {
-            out += "><skipped message=\"it has no result\"/></testcase>\n";
-        } else if (passed(run)) {
-            out += "/>\n";
-        } else {
-            const auto [gate, reason] = cause(run);
-            out += fmt::format("><failure type=\"{}\" message=\"{}\">{}</failure></testcase>\n", escape(gate),
-                               escape(reason), escape(run.folder));
-        }
+        const auto [gate, reason] = cause(run);
+        cases.push_back({{"name", fmt::format("run {} seed {}", run.run, run.seed)},
+                         {"state", run.result.is_null() ? "not judged"
+                                   : passed(run)        ? "passed"
+                                                        : "failed"},
+                         {"type", gate},
+                         {"reason", run.result.is_null() ? "it has no result" : reason},
+                         {"text", run.folder}});
     }
-    return out + "  </testsuite>\n";
+    return junit(suite, 0, cases);
 }
 
 std::string campaign_headline(const json& s) {
@@ -143,56 +136,23 @@ std::string campaign_headline(const json& s) {
     return fmt::format("{} of {} runs succeeded: {:.1f} %", good, runs, s["success_rate"].get<double>() * 100);
 }
 
-std::string campaign_page(const Scenario& scenario, const json& s, const std::string& folder) {
-    const auto percent = [](const json& v) { return v.get<double>() * 100; };
-    std::string body = fmt::format(
-        "<h1>{}</h1>\n<p class=\"lead\">{} {}</p>\n<p>With 95 % confidence between {:.1f} and {:.1f} % of all runs "
-        "succeed (Clopper and Pearson).</p>\n",
-        escape(scenario.title),
-        s["judged"] == s["runs"] ? badge(s["passed"]) : "<span class=\"badge none\">incomplete</span>",
-        escape(campaign_headline(s)), percent(s["success_interval_95"][0]), percent(s["success_interval_95"][1]));
-    const auto value = [](const json& d, const char* key, int digits) {
-        return fmt::format("{:.{}f}", d[key].get<double>(), digits);
-    };
-    if (!s["contact"].empty()) {
-        HtmlTable table{"condition", "#asked", "#mean", "#sigma", "#least", "#p99", "#most", ""};
-        for (const json& c : s["contact"])
-            table.row({c["title"],
-                       fmt::format("{:g} to {:g}", c["asked_min"].get<double>(), c["asked_max"].get<double>()),
-                       value(c, "mean", 4), value(c, "sigma", 4), value(c, "min", 4), value(c, "p99", 4),
-                       value(c, "max", 4), c["unit"]});
-        body += "<h2>Contact</h2>\n" +
-                charts_of(folder, {{"where", scenario.gear ? "Where they touched down" : "Where the ports met"},
-                                   {"rates", "Rates at contact"},
-                                   {"angles", "Angles at contact"},
-                                   {"tilt", "Tilt and angular rate at the touchdown"}}) +
-                table.html();
-    }
-    HtmlTable navigation{"of each run", "#mean", "#p50", "#p99", "#most"};
-    const auto row = [&](const char* title, const json& d) {
-        if (d.is_object())
-            navigation.row(
-                {title, value(d, "mean", 3), value(d, "p50", 3), value(d, "p99", 3), value(d, "max", 3)});
-    };
-    row("squared errors over variances (6 is right)", s["navigation"]["nees"]);
-    row("largest position error [m]", s["navigation"]["largest_position_error_m"]);
-    row("largest attitude error [deg]", s["navigation"]["largest_attitude_error_deg"]);
-    row("time until the end [s]", s["duration_s"]);
-    body += "<h2>Navigation</h2>\n" + navigation.html() + "<h2>Failures</h2>\n";
-    if (s["failures"].empty()) body += "<p>None.</p>\n";
-    const auto link = [](const json& run, std::string_view words) {
-        return fmt::format("<a href=\"{}/index.html\">{}{}</a>", run["folder"].get<std::string>(),
-                           run["run"].get<int>(), words);
-    };
-    for (const auto& [gate, list] : s["failures"].items()) {
-        HtmlTable table{"run", "seed", "reason"};
-        for (const json& f : list)
-            table.row({link(f, ""), f["seed"].dump(), escape(f["reason"].get<std::string>())});
-        body += fmt::format("<h3>{}: {} runs</h3>\n", escape(gate), list.size()) + table.html();
-    }
-    body += "<h2>All runs</h2>\n<p>";
-    for (const json& run : s["each"]) body += link(run, run["passed"].get<bool>() ? "" : " (failed)") + " ";
-    return page_around(scenario.title, body + "</p>\n");
+std::string campaign_page(const Scenario& scenario, const json& summary, const std::string& folder) {
+    const bool complete = summary["judged"] == summary["runs"], passed = summary["passed"];
+    json page = summary, failed = json::array();
+    for (const auto& [gate, runs] : summary["failures"].items())
+        failed.push_back({{"gate", gate}, {"count", runs.size()}, {"runs", runs}});
+    page.update({{"title", scenario.title},
+                 {"outcome", !complete ? "incomplete"
+                             : passed  ? "passed"
+                                       : "failed"},
+                 {"headline", campaign_headline(summary)},
+                 {"low_percent", summary["success_interval_95"][0].get<double>() * 100},
+                 {"high_percent", summary["success_interval_95"][1].get<double>() * 100},
+                 {"made_contact", !summary["contact"].empty()},
+                 {"where", scenario.gear ? "Where they touched down" : "Where the ports met"},
+                 {"charts", drawn_charts(folder)},
+                 {"failed", failed}});
+    return filled(template_text("campaign.html"), page);
 }
 
 }  // namespace narpa::rehearsal

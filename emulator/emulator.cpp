@@ -37,23 +37,20 @@ Status check_budget(const Scene& scene, const RunOptions& options) {
 /// Two writers of one file or device would overwrite each other's items; packets of two LiDARs to one port could
 /// not be told apart, as they come from one address.
 Status check_destinations(const RunOptions& options) {
-    namespace fs = std::filesystem;
-    std::set<fs::path> taken;
-    for (const auto& [flag, outputs] : {std::pair{"--video", &options.video}, {"--lidar", &options.lidar}}) {
-        for (const auto& [name, sink] : *outputs) {
-            std::error_code unknown;
-            const bool is_udp = sink.starts_with("udp:");
-            const bool is_device_or_fifo = fs::is_other(sink, unknown);
-            if (!is_udp && !is_device_or_fifo && !sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
-            const fs::path place = is_udp ? fs::path(sink.substr(0, sink.find(',')))
-                                          : fs::weakly_canonical(fs::absolute(sink, unknown), unknown);
-            if ((is_udp || !unknown) && !taken.insert(place).second)
+    std::set<std::string> taken;
+    const auto take = [&](const char* flag, const auto& outputs, const auto& kind_of) -> Status {
+        for (const auto& [name, sink] : outputs) {
+            const DeviceKind* kind = kind_of(sink);
+            const std::string place = kind ? kind->place_of(sink) : "";
+            if (!place.empty() && !taken.insert(place).second)
                 return Error{
                     fmt::format("{} {}={}: another output goes there too, expected a {} of its own for each", flag,
-                                name, sink, is_udp ? "port" : "file or device")};
+                                name, sink, kind->destination == Destination::port ? "port" : "file or device")};
         }
-    }
-    return Ok{};
+        return Ok{};
+    };
+    if (auto good = take("--video", options.video, video_sink_kind); !good) return good;
+    return take("--lidar", options.lidar, packet_sink_kind);
 }
 
 /// Opens the sinks of sensor `index`, in the order in which they were given.
@@ -103,25 +100,13 @@ Result<std::unique_ptr<Sensor>> open_camera(const World& world, std::size_t inde
     return std::unique_ptr<Sensor>(std::move(camera));
 }
 
-Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file) {
-    if (!has_bus) return Error{fmt::format("--lidar {}=can needs --can BUS", lidar.name)};
-    const LidarSpec& spec = lidar.model->spec();
-    const double shots_hz =
-        1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
-    if (shots_hz <= LidarSensor::kMaxBeams_hz) return Ok{};
-    return Error{
-        fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
-                    "frames)",
-                    lidar.name, shots_hz, LidarSensor::kMaxBeams_hz),
-        file};
-}
-
 Result<std::unique_ptr<Sensor>> open_lidar(const World& world, std::size_t index, const RunOptions& o,
                                            bool /*telemetry*/) {
     const Scene& scene = world.scene();
     auto packets = o.lidar;
     const auto to_can = [&](const auto& output) {
-        return output.second == "can" && output.first == scene.lidars[index].name;
+        const DeviceKind* kind = packet_sink_kind(output.second);
+        return kind && kind->destination == Destination::bus && output.first == scene.lidars[index].name;
     };
     const bool beams = std::erase_if(packets, to_can) > 0;
     if (beams)

@@ -100,4 +100,17 @@ Status LidarSensor::finish() {
     return sent ? logged : sent;
 }
 
+Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file) {
+    if (!has_bus) return Error{fmt::format("--lidar {}=can needs --can BUS", lidar.name)};
+    const LidarSpec& spec = lidar.model->spec();
+    const double shots_hz =
+        1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
+    if (shots_hz <= LidarSensor::kMaxBeams_hz) return Ok{};
+    return Error{
+        fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
+                    "frames)",
+                    lidar.name, shots_hz, LidarSensor::kMaxBeams_hz),
+        file};
+}
+
 }  // namespace narpa

@@ -76,4 +76,7 @@ private:
     std::uint64_t beams_lost_ = 0;  ///< the CAN thread did not keep up
 };
 
+/// An Error unless each shot of this LiDAR can be reported on the run's CAN bus. `file`: the scene's.
+[[nodiscard]] Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file);
+
 }  // namespace narpa

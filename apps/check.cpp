@@ -14,15 +14,18 @@
 
 #include "apps/calibration.h"
 #include "apps/cli.h"
+#include "apps/device_options.h"
 #include "apps/exposure_advice.h"
 #include "apps/shipped.h"
 #include "base/constants.h"
 #include "base/write_file.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/can/usb_adapters.h"
+#include "drivers/lidar/packet_sink.h"
 #include "drivers/video/bulk_bridges.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/camera/camera_unit.h"
+#include "emulator/lidar/lidar_sensor.h"
 #include "emulator/world.h"
 #include "protocols/can/dbc.h"
 #include "protocols/lidar/lidar_model.h"
@@ -36,6 +39,7 @@ namespace {
 struct CheckOptions {
     std::string scene, dbc, calibration;
     std::vector<std::string> devices;
+    DeviceOptions named;
 };
 
 /// One thing that a run may need from this machine.
@@ -356,37 +360,88 @@ void check_exposures(const World& world, nlohmann::json& document) {
     }
 }
 
-/// True for texts of a CAN bus: a known prefix, or the name of a network interface.
-bool is_bus(const std::string& spec) {
-    std::error_code none;
-    for (const char* prefix : {"slcan:", "udp:", "usb:", "log:", "can", "vcan"})
-        if (spec.starts_with(prefix)) return true;
-    return spec.find('/') == std::string::npos && std::filesystem::exists("/sys/class/net/" + spec, none);
-}
-
 /// The finding for a device that cannot be opened, without the device's name in the error text.
 Finding absent(const std::string& spec, const Error& e) {
     const std::string name = spec == "usb:" || spec == "bulk:" ? spec.substr(0, spec.size() - 1) : spec;  // any
     return {name, false, e.what.starts_with(spec + ": ") ? e.what.substr(spec.size() + 2) : e.what, e.remedy};
 }
 
-/// Opens the device as a run would.
-Result<Finding> try_device(const std::string& spec) {
-    if (spec.starts_with("/dev/video") || spec.starts_with("bulk:")) {
-        auto sink = open_video_sink(spec, {640, 480, PixelFormat::grey, 100'000'000}, WhenFull::drop);
-        if (!sink && sink.error().kind == ErrorKind::bad_input) return sink.error();
-        if (!sink) return absent(spec, sink.error());
-        return Finding{spec, true, (*sink)->description(), ""};
+/// Tests a device as its kind says. `open`: as a run would.
+Result<Finding> test_device(const std::string& spec, const DeviceKind* kind, const auto& open) {
+    if (kind && kind->destination == Destination::new_file) {
+        const Status writable = check_writable(spec);
+        return writable ? Finding{spec, true, "can be written", ""} : absent(spec, writable.error());
     }
-    if (!is_bus(spec))
+    const auto device = open();
+    if (device) return Finding{spec, true, (*device)->description(), ""};
+    if (device.error().kind == ErrorKind::bad_input) return device.error();
+    return absent(spec, device.error());
+}
+Result<Finding> test_bus(const std::string& spec) {
+    return test_device(spec, can_bus_kind(spec), [&] { return open_can_bus(spec, CanRole::hub); });
+}
+Result<Finding> test_video(const std::string& spec, const VideoFormat& format) {
+    return test_device(spec, video_sink_kind(spec), [&] { return open_video_sink(spec, format, WhenFull::drop); });
+}
+Result<Finding> test_lidar(const std::string& spec, const Lidar& lidar, bool has_bus, const Scene& scene) {
+    const DeviceKind* kind = packet_sink_kind(spec);
+    if (kind && kind->destination == Destination::bus) {
+        if (auto good = check_beams_on_can(lidar, has_bus, scene.file); !good) return good.error();
+        return Finding{spec, true, "each shot of LiDAR " + lidar.name + " on the CAN bus", ""};
+    }
+    return test_device(spec, kind, [&] {
+        return open_packet_sink(spec, lidar.model->spec().network, scene.epoch_unix_ns, false,
+                                lidar.model->metadata());
+    });
+}
+
+/// A device without an option: the text alone shows what it is.
+Result<Finding> test_positional(const std::string& spec) {
+    const auto shown = [&](const DeviceKind* kind) { return kind && kind->shown_by(spec); };
+    const bool bus = shown(can_bus_kind(spec)), video = shown(video_sink_kind(spec)),
+               lidar = shown(packet_sink_kind(spec));
+    if (bus && !video && !lidar) return test_bus(spec);
+    if (video && !bus && !lidar) return test_video(spec, {640, 480, PixelFormat::grey, 100'000'000});
+    if (!bus && !video && !lidar)
         return Error{
-            "is neither a CAN bus nor a video device, expected vcan0, can0, slcan:PORT, udp:GROUP, usb:[ADAPTER], "
-            "/dev/videoN or bulk:[BRIDGE]",
+            "is neither a CAN bus nor a video device, expected what --can or --video of `narpa check --help` shows",
             spec};
-    auto bus = open_can_bus(spec, CanRole::hub);
-    if (bus) return Finding{spec, true, (*bus)->description(), ""};
-    if (bus.error().kind == ErrorKind::bad_input) return bus.error();
-    return absent(spec, bus.error());
+    const std::string can_option = "--can " + spec, video_option = "--video CAMERA=" + spec,
+                      lidar_option = "--lidar LIDAR=" + spec;
+    std::vector<std::string_view> options;
+    if (bus) options.push_back(can_option);
+    if (video) options.push_back(video_option);
+    if (lidar) options.push_back(lidar_option);
+    return Error{"needs the option that says what it is, expected " + list_of(options), spec};
+}
+
+/// Tests the devices of the command line.
+Status test_devices(const CheckOptions& o, const Scene& scene, std::vector<Finding>& findings) {
+    const auto add = [&](Result<Finding> finding) -> Status {
+        if (!finding) return finding.error();
+        findings.push_back(*std::move(finding));
+        return Ok{};
+    };
+    const auto video = o.named.video(), lidar = o.named.lidar();
+    if (!video) return video.error();
+    if (!lidar) return lidar.error();
+    for (const std::string& spec : o.devices)
+        if (auto good = add(test_positional(spec)); !good) return good;
+    if (!o.named.bus.empty())
+        if (auto good = add(test_bus(o.named.bus)); !good) return good;
+    for (const auto& [name, spec] : *video) {
+        const auto index = sensor_named(scene.cameras, name, "camera", scene.file);
+        if (!index) return index.error();
+        const Camera& c = scene.cameras[*index];
+        if (auto good = add(test_video(spec, {c.width, c.height, c.format, c.period_ns})); !good) return good;
+    }
+    for (const auto& [name, spec] : *lidar) {
+        const auto index = sensor_named(scene.lidars, name, "LiDAR", scene.file);
+        if (!index) return index.error();
+        if (auto good = add(test_lidar(spec, scene.lidars[*index], !o.named.bus.empty(), scene)); !good)
+            return good;
+    }
+    return Ok{};
 }
 
 /// Prints the scenario; returns its part of the document.
@@ -460,11 +515,7 @@ Outcome check(const CheckOptions& o) {
         permission("locked memory", RLIMIT_MEMLOCK, RLIM_INFINITY, "mlockall",
                    "limit {} KiB: page faults may cost deadlines", "memlock unlimited")};
     const std::size_t general = findings.size();
-    for (const std::string& spec : o.devices) {
-        auto finding = try_device(spec);
-        if (!finding) return finding.error();
-        findings.push_back(*std::move(finding));
-    }
+    if (auto tested = test_devices(o, (*world)->scene(), findings); !tested) return tested.error();
     nlohmann::json machine = nlohmann::json::array();
     for (const Finding& f : findings) {
         say(fmt::format("  [{}] {}: {}{}", f.there ? "ok" : "--", f.name, f.detail,
@@ -489,7 +540,8 @@ Command add_check(Parser app) {
     c.option("SCENE", o->scene, "Scene or scenario file (TOML), or a name that `narpa list` shows").required();
     c.option("DEVICE", o->devices,
              "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, usb:, /dev/video10, "
-             "bulk: ...");
+             "bulk: ... One that may be several things, such as udp:, needs its option");
+    o->named.add_to(c);
     c.option(
          "--calibration", o->calibration,
          "Write CAMERA.yaml (camera_info of ROS) and calibration.json here: matrix, distortion and mount of each "
@@ -498,6 +550,7 @@ Command add_check(Parser app) {
     c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file").type_name("FILE");
     c.group("Start here");
     c.examples({"narpa check docking", "narpa check my-scene.toml vcan0 /dev/video10",
+                "narpa check docking --can vcan0 --video nav=tcp:5000 --lidar top=udp:192.168.1.70:2368",
                 "narpa check docking --dbc out/docking.dbc"});
     return [o] { return check(*o); };
 }

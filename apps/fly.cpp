@@ -280,9 +280,7 @@ Command add_fly(Parser app) {
     c.option("TRAJECTORY", o->trajectory,
              "Poses of bodies over time (CSV, with the columns of a run's CAMERA.truth.csv)")
         .required();
-    c.option("--can", o->bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER] | log:FILE")
-        .type_name("BUS")
-        .required();
+    c.option("--can", o->bus, can_bus_help()).type_name("BUS").required();
     c.option("--id", o->ids,
              "Base identifier of a body's commands, the scene's can_id (default: 0x100, for a file with one body)")
         .type_name("BODY=ID")

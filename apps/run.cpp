@@ -6,8 +6,11 @@
 #include <optional>
 
 #include "apps/cli.h"
+#include "apps/device_options.h"
 #include "apps/scene_options.h"
 #include "base/ready.h"
+#include "drivers/lidar/packet_sink.h"
+#include "drivers/video/video_sink.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
 #include "emulator/report.h"
@@ -19,7 +22,7 @@ namespace {
 
 struct RunCommandOptions {
     std::string scene;
-    std::vector<std::string> video, lidar;
+    DeviceOptions devices;
     std::string cpus;
     std::optional<std::uint64_t> seed;
     BudgetOptions budget;
@@ -30,20 +33,11 @@ struct RunCommandOptions {
     int ready_fd = -1;
 };
 
-Status split_outputs(const std::vector<std::string>& texts, std::string_view expected,
-                     std::vector<std::pair<std::string, std::string>>& out) {
-    for (const std::string& text : texts) {
-        auto pair = split_pair(text, expected);
-        if (!pair) return pair.error();
-        out.push_back(*std::move(pair));
-    }
-    return Ok{};
-}
-
-/// Makes the folders of outputs that are files.
-Status make_folders(const std::vector<std::pair<std::string, std::string>>& outputs) {
+/// Makes the folders of outputs that are files. `kind_of`: the kind of a sink.
+Status make_folders(const DeviceOptions::Outputs& outputs, const auto& kind_of) {
     for (const auto& [sensor, sink] : outputs) {
-        if (!sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
+        const DeviceKind* kind = kind_of(sink);
+        if (!kind || kind->destination != Destination::new_file) continue;
         if (auto made = make_folder_of(sink); !made) return made;
     }
     return Ok{};
@@ -71,10 +65,12 @@ Step step_of(const Emulator& emulator) {
 Outcome run(const RunCommandOptions& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
     RunOptions o = options.run;
-    if (auto good = split_outputs(options.video, "CAMERA=SINK, like nav=/dev/video10", o.video); !good)
-        return good.error();
-    if (auto good = split_outputs(options.lidar, "LIDAR=SINK, like top=udp:127.0.0.1:2368", o.lidar); !good)
-        return good.error();
+    auto video = options.devices.video(), lidar = options.devices.lidar();
+    if (!video) return video.error();
+    if (!lidar) return lidar.error();
+    o.bus = options.devices.bus;
+    o.video = *std::move(video);
+    o.lidar = *std::move(lidar);
     if (!options.cpus.empty()) {
         auto cpus = parse_cpus(options.cpus);
         if (!cpus) return cpus.error();
@@ -97,8 +93,8 @@ Outcome run(const RunCommandOptions& options) {
     if (!scene) return scene.error();
     options.budget.override_scene(scene->render);
     if (options.seed) scene->render.seed = *options.seed;
-    for (const auto* outputs : {&o.video, &o.lidar})
-        if (auto made = make_folders(*outputs); !made) return made.error();
+    if (auto made = make_folders(o.video, video_sink_kind); !made) return made.error();
+    if (auto made = make_folders(o.lidar, packet_sink_kind); !made) return made.error();
     auto emulator = Emulator::create(*std::move(scene), o);
     if (!emulator) return emulator.error();
 
@@ -128,21 +124,7 @@ Command add_run(Parser app) {
     const Parser c =
         app.subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
     c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
-    c.option("--can", o->run.bus,
-             "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER] (a gs_usb adapter) | log:FILE")
-        .type_name("BUS");
-    c.option(
-         "--video", o->video,
-         "/dev/videoN | uvc:[ADDRESS:]PORT (a USB camera over USB/IP) | bulk:[VENDOR:PRODUCT/][SERIAL|BUS-PORT] "
-         "(a USB frame bridge: FPGA, FX3) | FILE.y4m | a FIFO | none; may be given many times")
-        .type_name("CAMERA=SINK")
-        .repeatable();
-    c.option("--lidar", o->lidar,
-             "udp:HOST:PORT (with %INTERFACE after HOST, ,ttl=N after PORT) | FILE.pcap | ouster:[ADDRESS:]PORT "
-             "(an Ouster sensor's HTTP server) | can (each shot on "
-             "the CAN bus) | none; may be given many times")
-        .type_name("LIDAR=SINK")
-        .repeatable();
+    o->devices.add_to(c);
     const Option lockstep = c.flag("--lockstep", o->run.lockstep,
                                    "The clock advances only with commands; no wall time enters any result");
     c.option("--seed", o->seed, "Seed of the sensors' noise and of the renders, instead of the scene's");

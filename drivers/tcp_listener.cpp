@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/read_number.h"
+
 namespace narpa {
 
 Result<TcpListener> listen_tcp(const std::string& address, std::uint16_t port) {
@@ -28,6 +30,17 @@ Result<TcpListener> listen_tcp(const std::string& address, std::uint16_t port) {
             .what = "cannot listen at " + address + ":" + std::to_string(port) + ": " + std::strerror(errno),
             .kind = ErrorKind::missing};
     return TcpListener{std::move(fd), ntohs(at.sin_port)};
+}
+
+Result<ListenAddress> parse_listen_address(std::string_view text) {
+    ListenAddress at;
+    const std::size_t colon = text.rfind(':');
+    if (colon != std::string_view::npos) at.host = text.substr(0, colon);
+    in_addr unused{};
+    if (!read_number(text.substr(colon == std::string_view::npos ? 0 : colon + 1), at.port) ||
+        ::inet_pton(AF_INET, at.host.c_str(), &unused) != 1)
+        return Error{"\"" + std::string(text) + "\": expected [ADDRESS:]PORT, such as 3240 or 0.0.0.0:3240"};
+    return at;
 }
 
 }  // namespace narpa

@@ -1,10 +1,11 @@
 #include "drivers/write_queue.h"
 
-#include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -77,14 +78,14 @@ int WriteQueue::time_left_ms() const noexcept {
 }
 
 void WriteQueue::run() noexcept {
-    for (std::uint64_t next = 0;;) {
+    for (;;) {
         sync_if_due();
-        if (next == pushed_.load(std::memory_order_acquire)) {
+        if (next_write_ == pushed_.load(std::memory_order_acquire)) {
             if (ending_.load(std::memory_order_acquire)) return;
             wait_for_work();
             continue;
         }
-        const std::size_t slot = next++ % slots_;
+        const std::size_t slot = next_write_++ % slots_;
         const std::span<const std::uint8_t> item{ring_.data() + slot * slot_bytes_, sizes_[slot]};
         if (time_left_ms() == 0) {
             writer_.abandon(item);
@@ -102,14 +103,21 @@ void WriteQueue::sync_if_due() noexcept {
     sync_due_ns_ = 0;
 }
 
+bool WriteQueue::wait(std::span<pollfd> fds, int timeout_ms) const noexcept {
+    assert(!fds.empty());
+    fds[0] = {wake_fd_, POLLIN, 0};
+    eventfd_t count = 0;
+    if (::poll(fds.data(), fds.size(), timeout_ms) > 0 && (fds[0].revents & POLLIN))
+        ::eventfd_read(wake_fd_, &count);
+    return next_write_ != pushed_.load(std::memory_order_acquire);
+}
+
 void WriteQueue::wait_for_work() noexcept {
-    pollfd fds[] = {{wake_fd_, POLLIN, 0}, {writer_.watched(), 0, 0}};
+    std::array<pollfd, 2> fds{{{}, {writer_.watched(), 0, 0}}};
     const std::int64_t left_ns = std::max<std::int64_t>(0, sync_due_ns_ - monotonic_ns());
     const int timeout_ms = sync_due_ns_ == 0 ? -1 : static_cast<int>(left_ns / 1'000'000) + 1;
-    if (::poll(fds, 2, timeout_ms) < 0) return;
+    wait(fds, timeout_ms);
     if (fds[1].revents & (POLLERR | POLLHUP)) writer_.lost();
-    eventfd_t count = 0;
-    if (fds[0].revents & POLLIN) ::eventfd_read(wake_fd_, &count);
 }
 
 }  // namespace narpa

@@ -7,6 +7,7 @@
 /// reader's descriptor at the same time. Ring buffers of libraries do not offer that poll.
 #pragma once
 
+#include <poll.h>
 #include <semaphore.h>
 
 #include <atomic>
@@ -60,6 +61,9 @@ public:
 
     /// For the writer: how long it may still block. -1: without limit; then it should call this repeatedly.
     [[nodiscard]] int time_left_ms() const noexcept;
+    /// For the writer: waits as poll() does, also for the next item; fds[0] is the queue's. True: there is a next
+    /// item.
+    bool wait(std::span<pollfd> fds, int timeout_ms) const noexcept;
 
 private:
     void run() noexcept;
@@ -72,6 +76,7 @@ private:
     std::vector<std::uint8_t> ring_;
     std::vector<std::size_t> sizes_;
     std::uint64_t next_push_ = 0;   // touched by the pusher only
+    std::uint64_t next_write_ = 0;  // touched by the queue's thread only
     std::int64_t sync_due_ns_ = 0;  // CLOCK_MONOTONIC; 0: nothing written since the last; the queue's thread only
     std::atomic<std::uint64_t> pushed_{0}, dropped_{0};
     std::atomic<std::int64_t> flush_deadline_ns_{0};  // CLOCK_MONOTONIC; 0: not flushing

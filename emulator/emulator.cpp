@@ -7,7 +7,10 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <string>
 
+#include "drivers/lidar/packet_sink.h"
+#include "drivers/video/video_sink.h"
 #include "emulator/camera/camera_sensor.h"
 #include "emulator/log/run_record.h"
 #include "emulator/threads.h"
@@ -37,23 +40,20 @@ Status check_budget(const Scene& scene, const RunOptions& options) {
 /// Two writers of one file or device would overwrite each other's items; packets of two LiDARs to one port could
 /// not be told apart, as they come from one address.
 Status check_destinations(const RunOptions& options) {
-    namespace fs = std::filesystem;
-    std::set<fs::path> taken;
-    for (const auto& [flag, outputs] : {std::pair{"--video", &options.video}, {"--lidar", &options.lidar}}) {
-        for (const auto& [name, sink] : *outputs) {
-            std::error_code unknown;
-            const bool is_udp = sink.starts_with("udp:");
-            const bool is_device_or_fifo = fs::is_other(sink, unknown);
-            if (!is_udp && !is_device_or_fifo && !sink.ends_with(".y4m") && !sink.ends_with(".pcap")) continue;
-            const fs::path place = is_udp ? fs::path(sink.substr(0, sink.find(',')))
-                                          : fs::weakly_canonical(fs::absolute(sink, unknown), unknown);
-            if ((is_udp || !unknown) && !taken.insert(place).second)
+    std::set<std::string> taken;
+    const auto take = [&](const char* flag, const auto& outputs, const auto& kind_of) -> Status {
+        for (const auto& [name, sink] : outputs) {
+            const DeviceKind* kind = kind_of(sink);
+            const std::string place = kind ? kind->place_of(sink) : "";
+            if (!place.empty() && !taken.insert(place).second)
                 return Error{
                     fmt::format("{} {}={}: another output goes there too, expected a {} of its own for each", flag,
-                                name, sink, is_udp ? "port" : "file or device")};
+                                name, sink, kind->destination == Destination::port ? "port" : "file or device")};
         }
-    }
-    return Ok{};
+        return Ok{};
+    };
+    if (auto good = take("--video", options.video, video_sink_kind); !good) return good;
+    return take("--lidar", options.lidar, packet_sink_kind);
 }
 
 }  // namespace

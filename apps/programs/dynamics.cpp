@@ -5,6 +5,7 @@
 #include "apps/programs/program.h"
 #include "base/fifo_priority.h"
 #include "base/stop.h"
+#include "drivers/can/can_bus.h"
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/dynamics/node.h"
 
@@ -38,7 +39,7 @@ Status simulate(Arguments& a) {
 
 void add_options(Arguments& a, const cli::Parser& p) {
     p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
-    p.option("--can", a.bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER]").type_name("BUS").required();
+    p.option("--can", a.bus, can_bus_help()).type_name("BUS").required();
     p.flag("--lockstep", a.options.lockstep,
            "Each control period waits for its actuator command; the same seed gives the same bytes");
     p.option("--seed", a.seed, "Of all random draws (default: the scenario's)");

@@ -5,6 +5,8 @@
 #include <optional>
 
 #include "apps/programs/program.h"
+#include "drivers/can/can_bus.h"
+#include "drivers/video/video_source.h"
 #include "rehearsal/navigation/node.h"
 
 namespace narpa::rehearsal {
@@ -49,11 +51,8 @@ Status run(Arguments& a) {
 
 void add_options(Arguments& a, const cli::Parser& p) {
     p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
-    p.option("--can", a.node.bus, "vcan0 | slcan:PORT | udp:239.74.163.2 | usb:[ADAPTER]")
-        .type_name("BUS")
-        .required();
-    p.option("--video", a.video,
-             "A FIFO, FILE.y4m, /dev/videoN or bridge:[ADDRESS:]PORT, for each of the scenario's cameras")
+    p.option("--can", a.node.bus, can_bus_help()).type_name("BUS").required();
+    p.option("--video", a.video, video_source_help() + ", for each of the scenario's cameras")
         .type_name("CAMERA=SOURCE")
         .repeatable();
     p.option("--lidar", a.lidar, "udp:PORT, for each of the scenario's LiDARs")

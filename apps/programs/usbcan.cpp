@@ -83,9 +83,7 @@ Status run_usbcan(const UsbCanArguments& a) {
 }
 
 void add_usbcan_options(UsbCanArguments& a, const cli::Parser& p) {
-    p.option("--can", a.bus, "The bus behind the adapter: vcan0 | slcan:PORT | udp:239.74.163.2")
-        .type_name("BUS")
-        .required();
+    p.option("--can", a.bus, "The bus behind the adapter: " + can_bus_help()).type_name("BUS").required();
     p.option("--listen", a.listen, "[ADDRESS:]PORT where hosts find it (default: port 3240 of the loopback)")
         .type_name("PORT");
     p.option("--serial", a.serial, "Its serial number").shows_default();

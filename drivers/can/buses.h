@@ -1,4 +1,5 @@
-/// drivers/can/buses.h - one opener for each kind of bus; `open_can_bus` chooses among them.
+/// drivers/can/buses.h - one opener for each row of the table in can_bus.cpp. They get the text after the
+/// prefix.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +12,19 @@ namespace narpa {
 
 using CanBusResult = Result<std::unique_ptr<CanBus>>;
 
-CanBusResult open_socketcan(const std::string& interface);
-/// Port 0 takes a free port; description() names it.
+CanBusResult open_socketcan(const std::string& interface, CanRole role);
+/// `port`: of the hub; for a hub, 0 takes a free one, which description() names. A client returns once the hub has
+/// opened the channel: no frame of the bus is missed after that.
+CanBusResult open_slcan(const std::string& port, CanRole role);
 CanBusResult open_slcan_hub(std::uint16_t port);
-/// Returns once the hub has opened the channel: no frame of the bus is missed after that.
 CanBusResult open_slcan_client(std::uint16_t port);
 /// `group`: an IPv4 multicast address.
-CanBusResult open_udp_multicast(const std::string& group);
+CanBusResult open_udp_multicast(const std::string& group, CanRole role);
 /// A USB-CAN adapter through libusb. `text`: drivers/can/usb_spec.h. A missing one is an error; one that is pulled
 /// out later is looked for once a second.
-CanBusResult open_gs_usb(std::string_view text);
-CanBusResult open_candump_reader(const std::string& path);
-CanBusResult open_candump_writer(const std::string& path);
+CanBusResult open_gs_usb(const std::string& text, CanRole role);
+/// A hub reads the log, a client writes it.
+CanBusResult open_candump(const std::string& path, CanRole role);
 
 /// The smallest length of a CAN FD frame that holds `size` bytes (ISO 11898-1: 0..8, 12, 16, 20, 24, 32, 48, 64).
 [[nodiscard]] constexpr std::uint8_t fd_length(std::uint8_t size) noexcept {

@@ -2,41 +2,53 @@
 
 #include <net/if.h>
 
-#include "base/read_number.h"
+#include <algorithm>
+#include <array>
+
 #include "drivers/can/buses.h"
 
 namespace narpa {
 namespace {
 
-CanBusResult open_slcan(std::string_view text, CanRole role) {
-    std::uint16_t port = 0;
-    // Port 0 lets the kernel choose; only a listening socket can do that.
-    if (!read_number(text, port) || (port == 0 && role == CanRole::client))
-        return Error{"slcan:" + std::string(text) + ": expected a TCP port from 1 to 65535, such as slcan:29537"};
-    return role == CanRole::hub ? open_slcan_hub(port) : open_slcan_client(port);
+struct CanBusKind : DeviceKind {
+    CanBusResult (*open)(const std::string& rest, CanRole role);
+};
+
+bool is_interface_name(const std::string& text);
+bool is_interface(const std::string& text) {
+    return text.starts_with("can") || text.starts_with("vcan") || ::if_nametoindex(text.c_str()) != 0;
+}
+
+constexpr std::array kBuses{
+    CanBusKind{{"", "an interface (can0, vcan0)", "vcan0, can0 (SocketCAN)", is_interface_name, is_interface},
+               open_socketcan},
+    CanBusKind{{"slcan:", "slcan:PORT", "slcan:PORT (slcan clients over TCP or a pty)"}, open_slcan},
+    CanBusKind{{"udp:", "udp:GROUP", "udp:239.74.163.2 (multicast on this machine)"}, open_udp_multicast},
+    CanBusKind{{"usb:", "usb:[ADAPTER]", "usb:[ADAPTER][/CHANNEL][@BIT_RATE[,DATA_BIT_RATE]] (a gs_usb adapter)"},
+               open_gs_usb},
+    CanBusKind{{"log:", "log:FILE", "log:FILE (a candump log)"}, open_candump},
+};
+constexpr std::span<const CanBusKind> kBusTable{kBuses};
+
+/// A prefix without its colon is a mistake.
+bool is_interface_name(const std::string& text) {
+    return !text.empty() && text.size() < IFNAMSIZ && text.find_first_of(":/ \t") == text.npos &&
+           std::ranges::none_of(kBusTable, [&](const CanBusKind& k) { return k.prefix == text + ":"; });
 }
 
 }  // namespace
 
+const DeviceKind* can_bus_kind(const std::string& spec) {
+    return find_kind(kBusTable, spec);
+}
+std::string can_bus_help() {
+    return help_of(kBusTable);
+}
+
 CanBusResult open_can_bus(std::string_view spec, CanRole role) {
-    const std::size_t colon = spec.find(':');
-    const std::string_view scheme = spec.substr(0, colon);
-    if (colon != std::string_view::npos) {
-        const std::string_view rest = spec.substr(colon + 1);
-        if (scheme == "slcan") return open_slcan(rest, role);
-        if (scheme == "udp") return open_udp_multicast(std::string(rest));
-        if (scheme == "usb") return open_gs_usb(rest);
-        if (scheme == "log") {
-            if (rest.empty()) return Error{"log: expected the name of a candump log, such as log:run.log"};
-            return role == CanRole::hub ? open_candump_reader(std::string(rest))
-                                        : open_candump_writer(std::string(rest));
-        }
-    } else if (scheme != "slcan" && scheme != "udp" && scheme != "usb" && scheme != "log" && !spec.empty() &&
-               spec.size() < IFNAMSIZ && spec.find_first_of("/ \t") == std::string_view::npos) {
-        return open_socketcan(std::string(spec));
-    }
-    return Error{"unknown CAN bus \"" + std::string(spec) +
-                 "\": expected an interface (can0, vcan0), slcan:PORT, udp:GROUP, usb:[ADAPTER] or log:FILE"};
+    const std::string text(spec);
+    if (const CanBusKind* kind = find_kind(kBusTable, text)) return kind->open(kind->rest_of(text), role);
+    return Error{"unknown CAN bus \"" + text + "\": expected " + forms_of(kBusTable)};
 }
 
 }  // namespace narpa

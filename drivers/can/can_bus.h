@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "drivers/device_kind.h"
 #include "protocols/can/frame.h"
 
 namespace narpa {
@@ -72,8 +73,11 @@ inline constexpr int kFramesPerTurn = 4096;
 /// bus has a server (slcan) or a direction (log: a hub reads it, a client writes it).
 enum class CanRole : std::uint8_t { hub, client };
 
-/// BUS: `vcan0`/`can0` (SocketCAN) | `slcan:PORT` | `udp:GROUP` |
-/// `usb:[ADAPTER][/CHANNEL][@BIT_RATE[,DATA_BIT_RATE]]` | `log:FILE`.
+/// BUS: a text of one of the kinds in can_bus.cpp.
 Result<std::unique_ptr<CanBus>> open_can_bus(std::string_view spec, CanRole role);
+/// The kind that a text names; null: none.
+[[nodiscard]] const DeviceKind* can_bus_kind(const std::string& spec);
+/// All kinds, for --help.
+[[nodiscard]] std::string can_bus_help();
 
 }  // namespace narpa

@@ -89,9 +89,7 @@ Error cannot(const char* what, const std::string& path, int reason) {
             .kind = kind};
 }
 
-}  // namespace
-
-CanBusResult open_candump_reader(const std::string& path) {
+CanBusResult open_reader(const std::string& path) {
     std::ifstream file(path);
     if (!file) return cannot("open", path, errno);
     std::vector<ReceivedFrame> frames;
@@ -114,10 +112,17 @@ CanBusResult open_candump_reader(const std::string& path) {
     return CanBusResult(std::make_unique<CandumpReader>(std::move(frames), error_frames, path));
 }
 
-CanBusResult open_candump_writer(const std::string& path) {
+CanBusResult open_writer(const std::string& path) {
     Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
     if (!fd) return cannot("write", path, errno);
     return CanBusResult(std::make_unique<CandumpWriter>(std::move(fd), path));
+}
+
+}  // namespace
+
+CanBusResult open_candump(const std::string& path, CanRole role) {
+    if (path.empty()) return Error{"log: expected the name of a candump log, such as log:run.log"};
+    return role == CanRole::hub ? open_reader(path) : open_writer(path);
 }
 
 }  // namespace narpa

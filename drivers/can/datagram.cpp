@@ -59,4 +59,12 @@ Datagram receive_datagram(int fd, std::span<std::uint8_t> buffer, sockaddr* sour
     return d;
 }
 
+bool send_datagram(int fd, std::span<const std::uint8_t> bytes, const sockaddr* to, socklen_t to_bytes) noexcept {
+    ssize_t n = 0;
+    do {
+        n = ::sendto(fd, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL, to, to_bytes);
+    } while (n < 0 && errno == EINTR);
+    return n == static_cast<ssize_t>(bytes.size());
+}
+
 }  // namespace narpa

@@ -1,4 +1,5 @@
-/// drivers/can/datagram.h - reading one datagram with the time of its arrival and the kernel's count of lost ones.
+/// drivers/can/datagram.h - one datagram: sent, or read with the time of its arrival and the kernel's
+/// count of lost ones.
 #pragma once
 
 #include <sys/socket.h>
@@ -34,5 +35,9 @@ private:
 /// Does not wait. `source`, where given, gets the sender's address.
 [[nodiscard]] Datagram receive_datagram(int fd, std::span<std::uint8_t> buffer, sockaddr* source = nullptr,
                                         socklen_t source_bytes = 0) noexcept;
+
+/// Does not wait; true: the whole datagram was sent.
+[[nodiscard]] bool send_datagram(int fd, std::span<const std::uint8_t> bytes, const sockaddr* to,
+                                 socklen_t to_bytes) noexcept;
 
 }  // namespace narpa

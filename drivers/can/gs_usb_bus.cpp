@@ -136,7 +136,7 @@ private:
 
 }  // namespace
 
-CanBusResult open_gs_usb(std::string_view text) {
+CanBusResult open_gs_usb(const std::string& text, CanRole /*role*/) {
     auto spec = parse_usb_can(text);
     if (!spec) return spec.error();
     auto shared = std::make_unique<GsUsbShared>();
@@ -148,7 +148,7 @@ CanBusResult open_gs_usb(std::string_view text) {
     auto link = GsUsbLink::open(*spec, *shared);
     if (!link) {
         Error e = link.error();
-        e.what = "usb:" + std::string(text) + ": " + e.what;
+        e.what = "usb:" + text + ": " + e.what;
         return e;
     }
     return CanBusResult(std::make_unique<UsbCanBus>(*std::move(spec), std::move(shared), *std::move(link)));
@@ -164,7 +164,7 @@ Result<std::vector<PluggedUsbDevice>> find_usb_adapters() {
 
 namespace narpa {
 
-CanBusResult open_gs_usb(std::string_view text) {
+CanBusResult open_gs_usb(const std::string& text, CanRole /*role*/) {
     if (auto spec = parse_usb_can(text); !spec) return spec.error();
     return built_without_usb();
 }

@@ -13,9 +13,11 @@
 #include <cstring>
 #include <vector>
 
+#include "base/read_number.h"
 #include "drivers/can/buses.h"
 #include "drivers/can/client_hub.h"
 #include "drivers/can/slcan_stream.h"
+#include "drivers/tcp_listener.h"
 
 namespace narpa {
 namespace {
@@ -255,20 +257,20 @@ Error failed(const std::string& what) {
 
 }  // namespace
 
+CanBusResult open_slcan(const std::string& text, CanRole role) {
+    std::uint16_t port = 0;
+    // Port 0 lets the kernel choose; only a listening socket can do that.
+    if (!read_number(text, port) || (port == 0 && role == CanRole::client))
+        return Error{"slcan:" + text + ": expected a TCP port from 1 to 65535, such as slcan:29537"};
+    return role == CanRole::hub ? open_slcan_hub(port) : open_slcan_client(port);
+}
+
 CanBusResult open_slcan_hub(std::uint16_t port) {
     const std::string name = "slcan:" + std::to_string(port);
-    Descriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-    const int on = 1;
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t bytes = sizeof address;
-    auto* const raw = reinterpret_cast<sockaddr*>(&address);
-    if (!listener || ::setsockopt(listener.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
-        ::bind(listener.get(), raw, sizeof address) != 0 || ::listen(listener.get(), kTcpClients) != 0 ||
-        ::getsockname(listener.get(), raw, &bytes) != 0) {
-        Error error = failed(name + ": cannot listen on 127.0.0.1:" + std::to_string(port));
+    auto listener = listen_tcp("127.0.0.1", port);
+    if (!listener) {
+        Error error = listener.error();
+        error.what = name + ": " + error.what;
         error.remedy = "another port, such as slcan:" + std::to_string(port < 65535 ? port + 1 : 29537) +
                        ", or see who has it: ss -ltnp 'sport = :" + std::to_string(port) + "'";
         return error;
@@ -285,7 +287,7 @@ CanBusResult open_slcan_hub(std::uint16_t port) {
     if (!far || ::tcgetattr(far.get(), &mode) != 0) return failed(name + ": " + path.data());
     ::cfmakeraw(&mode);
     if (::tcsetattr(far.get(), TCSANOW, &mode) != 0) return failed(name + ": " + path.data());
-    return CanBusResult(std::make_unique<SlcanHub>(std::move(listener), ntohs(address.sin_port), std::move(near),
+    return CanBusResult(std::make_unique<SlcanHub>(std::move(listener->fd), listener->port, std::move(near),
                                                    std::move(far), path.data()));
 }
 

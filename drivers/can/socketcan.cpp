@@ -193,7 +193,7 @@ Error interface_down(const std::string& name) {
 
 }  // namespace
 
-CanBusResult open_socketcan(const std::string& interface) {
+CanBusResult open_socketcan(const std::string& interface, CanRole /*role*/) {
     Descriptor fd = make_socket();
     if (!fd) {
         const int reason = errno;

@@ -57,8 +57,8 @@ public:
             }
             std::array<std::uint8_t, kUdpMulticastMaxBytes> bytes;
             const std::size_t n = encode_udp_multicast(padded, bytes);
-            sent = ::sendto(out_.get(), bytes.data(), n, MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&group_),
-                            sizeof group_) == static_cast<ssize_t>(n);
+            sent = send_datagram(out_.get(), std::span(bytes).first(n), reinterpret_cast<const sockaddr*>(&group_),
+                                 sizeof group_);
         }
         ++(sent ? counters_.sent : counters_.send_drops);
         return sent;
@@ -115,7 +115,7 @@ bool prepare_sender(int fd, in_addr loopback, sockaddr_in& own) {
 
 }  // namespace
 
-CanBusResult open_udp_multicast(const std::string& group) {
+CanBusResult open_udp_multicast(const std::string& group, CanRole /*role*/) {
     in_addr address{};
     if (::inet_pton(AF_INET, group.c_str(), &address) != 1 || !IN_MULTICAST(ntohl(address.s_addr)))
         return Error{"udp:" + group + ": expected an IPv4 multicast address, such as udp:239.74.163.2"};

@@ -1,4 +1,5 @@
-/// drivers/lidar/backends.h - the packet sinks behind open_packet_sink.
+/// drivers/lidar/backends.h - the packet sinks behind the rows of the table in open_packet_sink.cpp. They get the
+/// text after the prefix.
 #pragma once
 
 #include <memory>
@@ -8,11 +9,21 @@
 
 namespace narpa {
 
+using PacketSinkResult = Result<std::unique_ptr<PacketSink>>;
+
+/// As for open_packet_sink.
+struct PacketSinkOptions {
+    const LidarNetwork& network;
+    std::int64_t epoch_unix_ns;
+    bool wait_when_full;
+    std::string_view metadata;
+};
+
 /// `address`: udp_route.h.
-Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& address, const LidarNetwork& network);
-Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork& network,
-                                                   std::int64_t epoch_unix_ns, bool wait_when_full);
-/// `address` is PORT or ADDRESS:PORT to listen at.
-Result<std::unique_ptr<PacketSink>> open_ouster_sink(const std::string& address, std::string_view metadata);
+PacketSinkResult open_udp_sink(const std::string& address, const PacketSinkOptions& o);
+/// Writes the metadata, if there is any, to FILE.json beside the capture.
+PacketSinkResult open_pcap_sink(const std::string& path, const PacketSinkOptions& o);
+/// `address`: PORT or ADDRESS:PORT to listen at.
+PacketSinkResult open_ouster_sink(const std::string& address, const PacketSinkOptions& o);
 
 }  // namespace narpa

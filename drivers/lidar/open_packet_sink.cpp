@@ -1,8 +1,7 @@
+#include <array>
 #include <atomic>
 #include <exception>
-#include <utility>
 
-#include "base/write_file.h"
 #include "drivers/lidar/backends.h"
 
 namespace narpa {
@@ -19,27 +18,53 @@ private:
     std::atomic<std::uint64_t> sent_{0};
 };
 
+PacketSinkResult open_null_packet_sink(const std::string&, const PacketSinkOptions&) {
+    return std::unique_ptr<PacketSink>(new NullPacketSink);
+}
+PacketSinkResult refuse_bus(const std::string& text, const PacketSinkOptions&) {
+    return Error{"packet sink \"" + text + "\": only `narpa run` puts shots on a CAN bus"};
+}
+
+bool is_pcap(const std::string& text) {
+    return text.ends_with(".pcap");
+}
+bool is_can(const std::string& text) {
+    return text == "can";
+}
+
+struct PacketSinkKind : DeviceKind {
+    PacketSinkResult (*open)(const std::string& rest, const PacketSinkOptions& o);
+};
+constexpr std::array kPacketSinks{
+    PacketSinkKind{{"udp:", "udp:HOST:PORT", "udp:HOST[%INTERFACE]:PORT[,ttl=N]", {}, {}, Destination::port},
+                   open_udp_sink},
+    PacketSinkKind{{"", "FILE.pcap", "FILE.pcap", is_pcap, {}, Destination::new_file}, open_pcap_sink},
+    PacketSinkKind{{"ouster:", "ouster:PORT", "ouster:[ADDRESS:]PORT (an Ouster sensor's HTTP server)"},
+                   open_ouster_sink},
+    PacketSinkKind{{"", "can", "can (each shot on the CAN bus)", is_can, {}, Destination::bus}, refuse_bus},
+    PacketSinkKind{{"", "none", "none", is_none}, open_null_packet_sink},
+};
+constexpr std::span<const PacketSinkKind> kPacketSinkTable{kPacketSinks};
+
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
-                                                     std::int64_t epoch_unix_ns, bool wait_when_full,
-                                                     std::string_view metadata) {
-    constexpr std::string_view udp = "udp:", ouster = "ouster:";
-    const std::string text(spec);
+const DeviceKind* packet_sink_kind(const std::string& spec) {
+    return find_kind(kPacketSinkTable, spec);
+}
+std::string packet_sink_help() {
+    return help_of(kPacketSinkTable);
+}
+
+PacketSinkResult open_packet_sink(std::string_view spec, const LidarNetwork& network, std::int64_t epoch_unix_ns,
+                                  bool wait_when_full, std::string_view metadata) {
+    const std::string text(spec), name = "packet sink \"" + text + "\": ";
+    const PacketSinkKind* kind = find_kind(kPacketSinkTable, text);
+    if (kind == nullptr) return Error{name + "expected " + forms_of(kPacketSinkTable)};
     try {
-        if (text == "none") return std::unique_ptr<PacketSink>(new NullPacketSink);
-        if (text.starts_with(udp)) return open_udp_sink(text.substr(udp.size()), network);
-        if (text.starts_with(ouster)) return open_ouster_sink(text.substr(ouster.size()), metadata);
-        if (text.ends_with(".pcap")) {
-            auto sink = open_pcap_sink(text, network, epoch_unix_ns, wait_when_full);
-            if (!sink || metadata.empty()) return sink;
-            const Status written = write_file(document_beside(text), metadata);
-            return written ? std::move(sink) : Result<std::unique_ptr<PacketSink>>(written.error());
-        }
+        return kind->open(kind->rest_of(text), {network, epoch_unix_ns, wait_when_full, metadata});
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
-        return Error{"packet sink \"" + text + "\": " + e.what(), {}, 0, 0, ErrorKind::missing};
+        return Error{name + e.what(), {}, 0, 0, ErrorKind::missing};
     }
-    return Error{"packet sink \"" + text + "\": expected udp:HOST:PORT, FILE.pcap, ouster:PORT, or none"};
 }
 
 }  // namespace narpa

@@ -11,11 +11,12 @@
 #include <optional>
 #include <utility>
 
-#include "base/read_number.h"
+#include "drivers/can/datagram.h"
 #include "drivers/descriptor.h"
 #include "drivers/http/http_server.h"
 #include "drivers/lidar/backends.h"
 #include "drivers/lidar/ouster_api.h"
+#include "drivers/tcp_listener.h"
 
 namespace narpa {
 namespace {
@@ -62,12 +63,7 @@ public:
     bool send(PacketKind, std::span<const std::uint8_t> payload, std::int64_t) noexcept override {
         const auto to = destination_.get();
         if (!to) return true;  // no driver has asked for packets
-        ssize_t n = 0;
-        do
-            n = ::sendto(fd_.get(), payload.data(), payload.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-                         reinterpret_cast<const sockaddr*>(&*to), sizeof *to);
-        while (n < 0 && errno == EINTR);
-        const bool sent = n == static_cast<ssize_t>(payload.size());
+        const bool sent = send_datagram(fd_.get(), payload, reinterpret_cast<const sockaddr*>(&*to), sizeof *to);
         ++(sent ? sent_ : dropped_);
         return sent;
     }
@@ -86,22 +82,20 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_ouster_sink(const std::string& address, std::string_view metadata) {
-    const std::size_t colon = address.rfind(':');
-    const std::string host = colon == address.npos ? "127.0.0.1" : address.substr(0, colon);
-    std::uint16_t port = 0;
-    if (!read_number(std::string_view(address).substr(colon == address.npos ? 0 : colon + 1), port) || port == 0)
+PacketSinkResult open_ouster_sink(const std::string& address, const PacketSinkOptions& o) {
+    const auto at = parse_listen_address(address);
+    if (!at || at->port == 0)
         return Error{"ouster:" + address + ": expected ouster:PORT or ouster:ADDRESS:PORT, as in ouster:8080"};
-    auto api = OusterApi::create(std::string(metadata));
+    auto api = OusterApi::create(std::string(o.metadata));
     if (!api) return Error{"ouster:" + address + ": " + api.error().what};
     Descriptor fd(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     if (!fd) return Error{"ouster:" + address + ": " + std::strerror(errno), {}, 0, 0, ErrorKind::missing};
     const int on = 1;
     ::setsockopt(fd.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof on);
     auto sink = std::make_unique<OusterSink>(std::move(fd), *std::move(api),
-                                             "Ouster sensor, http://" + host + ":" + std::to_string(port) +
+                                             "Ouster sensor, http://" + at->host + ":" + std::to_string(at->port) +
                                                  "/api/v1, UDP to where a driver asks for it");
-    if (auto served = sink->serve(host, port); !served) {
+    if (auto served = sink->serve(at->host, at->port); !served) {
         Error error = served.error();
         error.what = "ouster:" + address + ": " + error.what;
         return error;

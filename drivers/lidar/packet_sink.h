@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "drivers/device_kind.h"
 #include "protocols/lidar/lidar_model.h"
 
 namespace narpa {
@@ -40,15 +41,18 @@ public:
     [[nodiscard]] virtual std::string_view fate() const { return "sent"; }
 };
 
-/// SINK: `udp:HOST[%INTERFACE]:PORT[,ttl=N]` (one receiver, a broadcast or a multicast address: udp_route.h) |
-/// `FILE.pcap` | `ouster:[ADDRESS:]PORT` | `none`. A capture shows the packets as `network` sends them by default;
-/// `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps. `wait_when_full`: a lockstep run waits for
-/// the disk where a real-time run drops. `metadata`: LidarModel::metadata(); if not empty, it is written to
-/// FILE.json beside a capture. `ouster:` emulates a sensor on the network: an HTTP server at ADDRESS (default
+/// SINK: a text of one of the kinds in open_packet_sink.cpp. A capture shows the packets as `network` sends them by
+/// default; `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps. `wait_when_full`: a lockstep run
+/// waits for the disk where a real-time run drops. `metadata`: LidarModel::metadata(); if not empty, it is written
+/// to FILE.json beside a capture. `ouster:` emulates a sensor on the network: an HTTP server at ADDRESS (default
 /// 127.0.0.1) serves the metadata and accepts the packets' destination; until then packets are discarded and not
 /// counted.
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
                                                      std::int64_t epoch_unix_ns, bool wait_when_full,
                                                      std::string_view metadata = {});
+/// The kind that a text names; null: none.
+[[nodiscard]] const DeviceKind* packet_sink_kind(const std::string& spec);
+/// All kinds, for --help.
+[[nodiscard]] std::string packet_sink_help();
 
 }  // namespace narpa

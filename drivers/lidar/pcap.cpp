@@ -1,4 +1,5 @@
 #include "base/time.h"
+#include "base/write_file.h"
 #include "drivers/lidar/backends.h"
 #include "drivers/lidar/packet_source.h"
 
@@ -190,8 +191,7 @@ std::size_t payload_at(const std::uint8_t* frame, std::size_t size, std::size_t 
 
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork& network,
-                                                   std::int64_t epoch_unix_ns, bool wait_when_full) {
+PacketSinkResult open_pcap_sink(const std::string& path, const PacketSinkOptions& o) {
     constexpr int snapshot_bytes = 65535;
     pcap_t* pcap = ::pcap_open_dead_with_tstamp_precision(DLT_EN10MB, snapshot_bytes, PCAP_TSTAMP_PRECISION_NANO);
     if (pcap == nullptr) return Error{"libpcap gave no handle", path, 0, 0, ErrorKind::missing};
@@ -203,8 +203,10 @@ Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, cons
         ::pcap_close(pcap);
         return error;
     }
-    return std::unique_ptr<PacketSink>(
-        std::make_unique<PcapSink>(path, network, epoch_unix_ns, wait_when_full, pcap, dumper));
+    auto sink = std::make_unique<PcapSink>(path, o.network, o.epoch_unix_ns, o.wait_when_full, pcap, dumper);
+    if (!o.metadata.empty())
+        if (auto written = write_file(document_beside(path), o.metadata); !written) return written.error();
+    return std::unique_ptr<PacketSink>(std::move(sink));
 }
 
 Result<std::vector<std::vector<std::uint8_t>>> read_datagrams(const std::string& path, std::size_t payload_bytes) {
@@ -249,8 +251,7 @@ Error built_without(const std::string& path) {
 
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_pcap_sink(const std::string& path, const LidarNetwork&, std::int64_t,
-                                                   bool) {
+PacketSinkResult open_pcap_sink(const std::string& path, const PacketSinkOptions&) {
     return built_without(path);
 }
 Result<std::vector<std::vector<std::uint8_t>>> read_datagrams(const std::string& path, std::size_t) {

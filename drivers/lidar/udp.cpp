@@ -38,12 +38,8 @@ public:
 
     bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t) noexcept override {
         const UdpDestination& to = destinations_[kind == PacketKind::data ? 0 : 1];
-        ssize_t n = 0;
-        do
-            n = ::sendto(fd_.get(), payload.data(), payload.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-                         reinterpret_cast<const sockaddr*>(&to.address), to.size);
-        while (n < 0 && errno == EINTR);
-        const bool sent = n == static_cast<ssize_t>(payload.size());
+        const bool sent =
+            send_datagram(fd_.get(), payload, reinterpret_cast<const sockaddr*>(&to.address), to.size);
         ++(sent ? sent_ : dropped_);
         return sent;
     }
@@ -108,12 +104,13 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& text, const LidarNetwork& network) {
+PacketSinkResult open_udp_sink(const std::string& text, const PacketSinkOptions& o) {
+    const int position_port_offset = o.network.position_port_offset();
     const auto address = UdpAddress::parse(text);
     if (!address) return address.error();
     const std::string what = "udp:" + text;
     if (address->host.empty()) return Error{what + ": expected udp:HOST:PORT, as in udp:127.0.0.1:2368"};
-    const Result<int> port = data_port(address->port, text, network.position_port_offset());
+    const Result<int> port = data_port(address->port, text, position_port_offset);
     if (!port) return port.error();
     Result<UdpDestination> destination = UdpDestination::resolve(address->host, what);
     if (!destination) return destination.error();
@@ -126,7 +123,7 @@ Result<std::unique_ptr<PacketSink>> open_udp_sink(const std::string& text, const
     if (host != destination->text()) host += " (" + destination->text() + ")";
     if (!address->interface.empty()) host += " by " + address->interface;
     return std::unique_ptr<PacketSink>(
-        std::make_unique<UdpSink>(std::move(fd), *destination, *port, network.position_port_offset(), host));
+        std::make_unique<UdpSink>(std::move(fd), *destination, *port, position_port_offset, host));
 }
 
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) {

@@ -14,7 +14,6 @@
 #include <exception>
 #include <utility>
 
-#include "base/read_number.h"
 #include "base/time.h"
 #include "drivers/background_thread.h"
 #include "drivers/tcp_listener.h"
@@ -287,17 +286,6 @@ void UsbIpServer::accept_one() {
     ::setsockopt(fd.get(), IPPROTO_TCP, TCP_KEEPINTVL, &every_s, sizeof every_s);
     ::setsockopt(fd.get(), IPPROTO_TCP, TCP_KEEPCNT, &times, sizeof times);
     connections_.push_back(std::make_unique<Connection>(std::move(fd), *this));
-}
-
-Result<ListenAddress> parse_listen_address(std::string_view text) {
-    ListenAddress at;
-    const std::size_t colon = text.rfind(':');
-    if (colon != std::string_view::npos) at.host = text.substr(0, colon);
-    in_addr unused{};
-    if (!read_number(text.substr(colon == std::string_view::npos ? 0 : colon + 1), at.port) ||
-        ::inet_pton(AF_INET, at.host.c_str(), &unused) != 1)
-        return Error{"\"" + std::string(text) + "\": expected [ADDRESS:]PORT, such as 3240 or 0.0.0.0:3240"};
-    return at;
 }
 
 }  // namespace narpa

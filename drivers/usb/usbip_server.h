@@ -16,6 +16,7 @@
 
 #include "base/result.h"
 #include "drivers/descriptor.h"
+#include "drivers/tcp_listener.h"
 #include "drivers/usb/usb_device.h"
 #include "protocols/usb/usbip.h"
 
@@ -67,12 +68,5 @@ private:
     std::atomic<std::uint64_t> plugged_{0}, transfers_{0}, unlinked_{0}, refused_{0};
     std::thread thread_;
 };
-
-/// `[HOST:]PORT` of command lines: HOST is an IPv4 address, loopback where it is absent.
-struct ListenAddress {
-    std::string host = "127.0.0.1";
-    std::uint16_t port = 0;
-};
-Result<ListenAddress> parse_listen_address(std::string_view text);
 
 }  // namespace narpa

@@ -1,8 +1,10 @@
-/// drivers/video/backends.h - the video sinks and sources behind open_video_sink and open_video_source.
+/// drivers/video/backends.h - the video sinks and sources behind the rows of the tables in open_video.cpp.
+/// They get the text after the prefix.
 #pragma once
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "drivers/video/video_sink.h"
@@ -30,22 +32,31 @@ public:
 std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, const VideoFormat& format,
                                        WhenFull full, std::string description);
 
+using VideoSinkResult = Result<std::unique_ptr<VideoSink>>;
+using VideoSourceResult = Result<std::unique_ptr<VideoSource>>;
+
+struct VideoSinkOptions {
+    VideoFormat format;
+    WhenFull full;
+    std::optional<VideoControls> controls;
+};
+
 /// Opens the device, checks its format and starts it; a device that vanishes later is looked for once a second.
-Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const VideoFormat& format,
-                                                  WhenFull full);
+VideoSinkResult open_v4l2_sink(const std::string& path, const VideoSinkOptions& o);
 /// `address`: [HOST:]PORT to listen at for hosts that attach the camera.
-Result<std::unique_ptr<VideoSink>> open_uvc_sink(std::string_view address, const VideoFormat& format, WhenFull full,
-                                                 const std::optional<VideoControls>& controls);
+VideoSinkResult open_uvc_sink(const std::string& address, const VideoSinkOptions& o);
 /// `text`: [VENDOR:PRODUCT/][SERIAL|BUS-PORT]; a bridge that vanishes later is looked for once a second.
-Result<std::unique_ptr<VideoSink>> open_bulk_sink(std::string_view text, const VideoFormat& format, WhenFull full);
-/// `fifo`: the path is a FIFO; else a file, made or emptied.
-Result<std::unique_ptr<VideoSink>> open_y4m_sink(const std::string& path, bool fifo, const VideoFormat& format,
-                                                 WhenFull full);
+VideoSinkResult open_bulk_sink(const std::string& text, const VideoSinkOptions& o);
+/// `address`: [HOST:]PORT to listen at for clients that read Y4M.
+VideoSinkResult open_tcp_sink(const std::string& address, const VideoSinkOptions& o);
+/// The file is made or emptied.
+VideoSinkResult open_y4m_file(const std::string& path, const VideoSinkOptions& o);
+VideoSinkResult open_y4m_fifo(const std::string& path, const VideoSinkOptions& o);
 
 /// A device that is no camera yet (v4l2loopback before its writer's first frame) is tried again.
-Result<std::unique_ptr<VideoSource>> open_v4l2_source(const std::string& path, const VideoFormat& format);
+VideoSourceResult open_v4l2_source(const std::string& path, const VideoFormat& format);
 /// `address`: [HOST:]PORT to listen at for the host that attaches the bridge.
-Result<std::unique_ptr<VideoSource>> open_bridge_source(std::string_view address, const VideoFormat& format);
-Result<std::unique_ptr<VideoSource>> open_y4m_source(const std::string& path, const VideoFormat& format);
+VideoSourceResult open_bridge_source(const std::string& address, const VideoFormat& format);
+VideoSourceResult open_y4m_source(const std::string& path, const VideoFormat& format);
 
 }  // namespace narpa

@@ -37,10 +37,9 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<VideoSource>> open_bridge_source(std::string_view address, const VideoFormat& format) {
+VideoSourceResult open_bridge_source(const std::string& address, const VideoFormat& format) {
     auto at = parse_listen_address(address);
-    if (!at)
-        return Error{"bridge:" + std::string(address) + ": expected bridge:[ADDRESS:]PORT, such as bridge:3242"};
+    if (!at) return Error{"bridge:" + address + ": expected bridge:[ADDRESS:]PORT, such as bridge:3242"};
     auto source = std::make_unique<BridgeSource>(format);
     if (auto started = source->start(*at); !started) return started.error();
     return std::unique_ptr<VideoSource>(std::move(source));

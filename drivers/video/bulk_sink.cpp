@@ -182,19 +182,19 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<VideoSink>> open_bulk_sink(std::string_view text, const VideoFormat& format, WhenFull full) {
+VideoSinkResult open_bulk_sink(const std::string& text, const VideoSinkOptions& o) {
     auto spec = parse_bulk(text);
     if (!spec) return spec.error();
-    if (frame_bytes(format) > std::numeric_limits<std::uint32_t>::max())
-        return Error{"bulk:" + std::string(text) + ": expected frames below 4 GiB"};
-    auto writer = std::make_unique<BulkWriter>(*std::move(spec), format);
+    if (frame_bytes(o.format) > std::numeric_limits<std::uint32_t>::max())
+        return Error{"bulk:" + text + ": expected frames below 4 GiB"};
+    auto writer = std::make_unique<BulkWriter>(*std::move(spec), o.format);
     if (auto opened = writer->open(); !opened) {
         Error e = opened.error();
-        e.what = "bulk:" + std::string(text) + ": " + e.what;
+        e.what = "bulk:" + text + ": " + e.what;
         return e;
     }
     std::string description = writer->description();
-    return queued_sink(std::move(writer), format, full, std::move(description));
+    return queued_sink(std::move(writer), o.format, o.full, std::move(description));
 }
 
 Result<std::vector<PluggedUsbDevice>> find_bulk_bridges() {
@@ -203,7 +203,7 @@ Result<std::vector<PluggedUsbDevice>> find_bulk_bridges() {
 
 #else
 
-Result<std::unique_ptr<VideoSink>> open_bulk_sink(std::string_view text, const VideoFormat&, WhenFull) {
+VideoSinkResult open_bulk_sink(const std::string& text, const VideoSinkOptions&) {
     if (auto spec = parse_bulk(text); !spec) return spec.error();
     return built_without_usb();
 }

@@ -68,39 +68,61 @@ private:
     std::atomic<std::uint64_t> written_{0}, failed_{0};
 };
 
-Result<std::unique_ptr<VideoSink>> open_by_kind(const std::string& spec, const VideoFormat& format, WhenFull full,
-                                                const std::optional<VideoControls>& controls) {
-    constexpr std::string_view kUvc = "uvc:", kBulk = "bulk:";
-    if (spec.starts_with(kUvc))
-        return open_uvc_sink(std::string_view(spec).substr(kUvc.size()), format, full, controls);
-    if (spec.starts_with(kBulk)) return open_bulk_sink(std::string_view(spec).substr(kBulk.size()), format, full);
-    if (spec == "none") return std::unique_ptr<VideoSink>(new NullSink(frame_bytes(format)));
-    struct stat info {};
-    const bool exists = ::stat(spec.c_str(), &info) == 0;
-    if (exists && S_ISFIFO(info.st_mode)) return open_y4m_sink(spec, true, format, full);
-    if (spec.ends_with(".y4m")) return open_y4m_sink(spec, false, format, full);
-    if (spec.starts_with("/dev/video") || (exists && S_ISCHR(info.st_mode)))
-        return open_v4l2_sink(spec, format, full);
-    return Error{"video sink \"" + spec +
-                 "\": expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], FILE.y4m, an existing FIFO, or none"};
+VideoSinkResult open_null_video_sink(const std::string&, const VideoSinkOptions& o) {
+    return std::unique_ptr<VideoSink>(new NullSink(frame_bytes(o.format)));
 }
+
+mode_t type_of(const std::string& path) {
+    struct stat info {};
+    return ::stat(path.c_str(), &info) == 0 ? info.st_mode & S_IFMT : 0;
+}
+bool is_fifo(const std::string& text) {
+    return type_of(text) == S_IFIFO;
+}
+bool is_y4m_file(const std::string& text) {
+    return text.ends_with(".y4m") && !is_fifo(text);
+}
+bool is_existing_y4m_file(const std::string& text) {
+    return is_y4m_file(text) && type_of(text) != 0;
+}
+bool is_video_device(const std::string& text) {
+    return text.starts_with("/dev/video") ? !is_fifo(text) : type_of(text) == S_IFCHR && !is_y4m_file(text);
+}
+
+struct VideoSinkKind : DeviceKind {
+    VideoSinkResult (*open)(const std::string& rest, const VideoSinkOptions& o);
+};
+constexpr std::array kVideoSinks{
+    VideoSinkKind{{"", "/dev/videoN", "/dev/videoN (V4L2 output)", is_video_device, {}, Destination::device},
+                  open_v4l2_sink},
+    VideoSinkKind{{"uvc:", "uvc:PORT", "uvc:[ADDRESS:]PORT (a USB camera over USB/IP)"}, open_uvc_sink},
+    VideoSinkKind{
+        {"bulk:", "bulk:[BRIDGE]", "bulk:[VENDOR:PRODUCT/][SERIAL|BUS-PORT] (a USB frame bridge: FPGA, FX3)"},
+        open_bulk_sink},
+    VideoSinkKind{{"tcp:", "tcp:PORT", "tcp:[ADDRESS:]PORT (Y4M to each client that connects)"}, open_tcp_sink},
+    VideoSinkKind{{"", "FILE.y4m", "FILE.y4m", is_y4m_file, {}, Destination::new_file}, open_y4m_file},
+    VideoSinkKind{{"", "an existing FIFO", "a FIFO (Y4M)", is_fifo, {}, Destination::device}, open_y4m_fifo},
+    VideoSinkKind{{"", "none", "none", is_none}, open_null_video_sink},
+};
+constexpr std::span<const VideoSinkKind> kVideoSinkTable{kVideoSinks};
+
+struct VideoSourceKind : DeviceKind {
+    VideoSourceResult (*open)(const std::string& rest, const VideoFormat& format);
+};
+constexpr std::array kVideoSources{
+    VideoSourceKind{{"", "/dev/videoN", "/dev/videoN (V4L2 capture)", is_video_device}, open_v4l2_source},
+    VideoSourceKind{{"bridge:", "bridge:PORT", "bridge:[ADDRESS:]PORT (a USB frame bridge in software)"},
+                    open_bridge_source},
+    VideoSourceKind{{"", "FILE.y4m", "FILE.y4m (followed as it grows)", is_existing_y4m_file}, open_y4m_source},
+    VideoSourceKind{{"", "an existing FIFO", "a FIFO (Y4M)", is_fifo}, open_y4m_source},
+};
+constexpr std::span<const VideoSourceKind> kVideoSourceTable{kVideoSources};
 
 Error no_such_path(const std::string& spec) {
     Error error{"video source \"" + spec + "\": no such file or device", {}, 0, 0, ErrorKind::missing};
     if (!spec.starts_with("/dev/"))
         error.remedy = "mkfifo " + spec + "   (then narpa run --video CAMERA=" + spec + ")";
     return error;
-}
-
-Result<std::unique_ptr<VideoSource>> open_by_kind(const std::string& spec, const VideoFormat& format) {
-    constexpr std::string_view kBridge = "bridge:";
-    if (spec.starts_with(kBridge)) return open_bridge_source(std::string_view(spec).substr(kBridge.size()), format);
-    struct stat info {};
-    const bool exists = ::stat(spec.c_str(), &info) == 0;
-    if (spec.starts_with("/dev/video") || (exists && S_ISCHR(info.st_mode))) return open_v4l2_source(spec, format);
-    if (exists && (S_ISFIFO(info.st_mode) || spec.ends_with(".y4m"))) return open_y4m_source(spec, format);
-    if (!exists && !spec.empty()) return no_such_path(spec);
-    return Error{"video source \"" + spec + "\": expected /dev/videoN, bridge:PORT, FILE.y4m, or an existing FIFO"};
 }
 
 }  // namespace
@@ -116,25 +138,42 @@ std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, cons
     return std::make_unique<QueuedSink>(std::move(writer), format, full, std::move(description));
 }
 
-Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full,
-                                                   const std::optional<VideoControls>& controls) {
+const DeviceKind* video_sink_kind(const std::string& spec) {
+    return find_kind(kVideoSinkTable, spec);
+}
+std::string video_sink_help() {
+    return help_of(kVideoSinkTable);
+}
+std::string video_source_help() {
+    return help_of(kVideoSourceTable);
+}
+
+VideoSinkResult open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full,
+                                const std::optional<VideoControls>& controls) {
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
         return Error{"video: width, height and frame period must be positive"};
     if (const std::string what = unfit_size(format.pixel, format.width, format.height); !what.empty())
         return Error{"video: " + what};
+    const std::string text(spec), name = "video sink \"" + text + "\": ";
+    const VideoSinkKind* kind = find_kind(kVideoSinkTable, text);
+    if (kind == nullptr) return Error{name + "expected " + forms_of(kVideoSinkTable)};
     try {
-        return open_by_kind(std::string(spec), format, full, controls);
+        return kind->open(kind->rest_of(text), {format, full, controls});
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
-        return Error{"video sink \"" + std::string(spec) + "\": " + e.what(), {}, 0, 0, ErrorKind::missing};
+        return Error{name + e.what(), {}, 0, 0, ErrorKind::missing};
     }
 }
 
-Result<std::unique_ptr<VideoSource>> open_video_source(std::string_view spec, const VideoFormat& format) {
+VideoSourceResult open_video_source(std::string_view spec, const VideoFormat& format) {
     if (format.width <= 0 || format.height <= 0) return Error{"video: width and height must be positive"};
+    const std::string text(spec), name = "video source \"" + text + "\": ";
+    const VideoSourceKind* kind = find_kind(kVideoSourceTable, text);
+    if (kind == nullptr && type_of(text) == 0 && !text.empty()) return no_such_path(text);
+    if (kind == nullptr) return Error{name + "expected " + forms_of(kVideoSourceTable)};
     try {
-        return open_by_kind(std::string(spec), format);
+        return kind->open(kind->rest_of(text), format);
     } catch (const std::exception& e) {  // no memory
-        return Error{"video source \"" + std::string(spec) + "\": " + e.what(), {}, 0, 0, ErrorKind::missing};
+        return Error{name + e.what(), {}, 0, 0, ErrorKind::missing};
     }
 }
 

@@ -39,22 +39,22 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<VideoSink>> open_uvc_sink(std::string_view address, const VideoFormat& format, WhenFull full,
-                                                 const std::optional<VideoControls>& controls) {
+VideoSinkResult open_uvc_sink(const std::string& address, const VideoSinkOptions& o) {
+    const VideoFormat& format = o.format;
     auto at = parse_listen_address(address);
-    if (!at) return Error{"uvc:" + std::string(address) + ": expected uvc:[ADDRESS:]PORT, such as uvc:3240"};
+    if (!at) return Error{"uvc:" + address + ": expected uvc:[ADDRESS:]PORT, such as uvc:3240"};
     if (!uvc_carries(format.pixel))
-        return Error{"uvc:" + std::string(address) + ": a USB camera here carries GREY, Y16 and YUYV, not " +
+        return Error{"uvc:" + address + ": a USB camera here carries GREY, Y16 and YUYV, not " +
                      std::string(name(format.pixel)) + "; expected another format of the camera in the scene"};
     constexpr int kMax = 65535;  // of a frame descriptor
     if (format.width > kMax || format.height > kMax)
-        return Error{"uvc:" + std::string(address) + ": expected at most 65535 pixels each way"};
-    auto writer = std::make_unique<UvcWriter>(format, controls);
+        return Error{"uvc:" + address + ": expected at most 65535 pixels each way"};
+    auto writer = std::make_unique<UvcWriter>(format, o.controls);
     if (auto started = writer->start(*at); !started) return started.error();
     const std::string port = std::to_string(writer->port());
     std::string text = "USB camera at " + at->host + ":" + port + "; on the host, as root: usbip --tcp-port " +
                        port + " attach -r HOST -b " + std::string(UsbIpServer::kBusId);
-    return queued_sink(std::move(writer), format, full, std::move(text));
+    return queued_sink(std::move(writer), format, o.full, std::move(text));
 }
 
 }  // namespace narpa

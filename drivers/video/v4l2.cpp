@@ -136,11 +136,10 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<VideoSink>> open_v4l2_sink(const std::string& path, const VideoFormat& format,
-                                                  WhenFull full) {
-    Start start = start_device(path.c_str(), format);
-    if (start.step != Step::started) return describe(path, format, start);
-    return queued_sink(std::make_unique<V4l2Writer>(path, format, std::move(start.fd)), format, full,
+VideoSinkResult open_v4l2_sink(const std::string& path, const VideoSinkOptions& o) {
+    Start start = start_device(path.c_str(), o.format);
+    if (start.step != Step::started) return describe(path, o.format, start);
+    return queued_sink(std::make_unique<V4l2Writer>(path, o.format, std::move(start.fd)), o.format, o.full,
                        "V4L2 output " + path + ", " + format_text(start.got));
 }
 

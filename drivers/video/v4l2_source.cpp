@@ -196,7 +196,7 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<VideoSource>> open_v4l2_source(const std::string& path, const VideoFormat& format) {
+VideoSourceResult open_v4l2_source(const std::string& path, const VideoFormat& format) {
     Camera camera;
     const Result<Stage> stage = start(path, format, camera);
     if (!stage) {

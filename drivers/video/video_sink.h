@@ -1,5 +1,5 @@
-/// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a USB camera or frame bridge, a Y4M file or
-/// FIFO, or none.
+/// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a USB camera or frame bridge, Y4M to a file,
+/// a FIFO or TCP clients, or none.
 ///
 /// A sink owns a thread and a ring of preallocated frames, so that handing over a frame is one copy: no disk,
 /// reader or device can block the loop.
@@ -14,14 +14,15 @@
 
 #include "base/pixel_format.h"
 #include "base/result.h"
+#include "drivers/device_kind.h"
 
 namespace narpa {
 
 struct VideoCounters {
-    std::uint64_t written = 0;     ///< whole frames that reached the device, file or reader
-    std::uint64_t ring_full = 0;   ///< dropped: the sink could not keep up
-    std::uint64_t no_reader = 0;   ///< dropped: a FIFO without a reader
-    std::uint64_t failed = 0;      ///< dropped: the write failed (device gone, disk full)
+    std::uint64_t written = 0;    ///< whole frames that reached the device, file or reader
+    std::uint64_t ring_full = 0;  ///< dropped: the sink could not keep up
+    std::uint64_t no_reader = 0;  ///< dropped: a FIFO or TCP port without a reader
+    std::uint64_t failed = 0;  ///< dropped: the write failed (device gone, disk full), or a TCP client was too slow
     std::uint64_t reconnects = 0;  ///< times that a reader or a device was connected again
 };
 
@@ -64,10 +65,13 @@ public:
     virtual bool next_request(VideoRequest& /*request*/) noexcept { return false; }
 };
 
-/// SINK: `/dev/videoN` (V4L2 output) | `uvc:[ADDRESS:]PORT` (USB camera over USB/IP) |
-/// `bulk:[VENDOR:PRODUCT/][SERIAL|BUS-PORT]` (USB frame bridge) | `FILE.y4m` or an existing FIFO | `none`.
-/// `controls`: absent where the camera has none; sinks without controls leave them out.
+/// SINK: a text of one of the kinds in open_video.cpp. `controls`: absent where the camera has none; sinks without
+/// controls leave them out.
 Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const VideoFormat& format, WhenFull full,
                                                    const std::optional<VideoControls>& controls = {});
+/// The kind that a text names; null: none.
+[[nodiscard]] const DeviceKind* video_sink_kind(const std::string& spec);
+/// All kinds, for --help.
+[[nodiscard]] std::string video_sink_help();
 
 }  // namespace narpa

@@ -39,9 +39,10 @@ protected:
     VideoSourceCounters counters_{};
 };
 
-/// SOURCE: `/dev/videoN` (V4L2 capture) | `bridge:[ADDRESS:]PORT` (a USB frame bridge in software) | an existing
-/// FIFO or `FILE.y4m` (Y4M, as the sink writes it; a file is followed as it grows). Does not wait for a writer:
-/// errors that only its stream shows are in `status` later.
+/// SOURCE: a text of one of the kinds in open_video.cpp. Does not wait for a writer: errors that only its stream
+/// shows are in `status` later.
 Result<std::unique_ptr<VideoSource>> open_video_source(std::string_view spec, const VideoFormat& format);
+/// All kinds, for --help.
+[[nodiscard]] std::string video_source_help();
 
 }  // namespace narpa

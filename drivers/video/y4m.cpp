@@ -1,76 +1,14 @@
-#include "protocols/video/y4m.h"
-
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <sys/uio.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
-#include <vector>
 
 #include "drivers/descriptor.h"
-#include "drivers/video/backends.h"
+#include "drivers/video/y4m_writer.h"
 
 namespace narpa {
 namespace {
-
-constexpr int kPollPeriodMs = 20;  // between two checks of the deadline while a reader blocks or is away
-
-// A frame with its header, and the stream's header before the first, in pieces for writev.
-class Pieces {
-public:
-    void add(std::string_view text) noexcept { add(text.data(), text.size()); }
-    void add(std::span<const std::uint8_t> bytes) noexcept { add(bytes.data(), bytes.size()); }
-    [[nodiscard]] bool empty() const noexcept { return first_ == last_; }
-    [[nodiscard]] ssize_t write_to(int fd) const noexcept {
-        return ::writev(fd, pieces_.data() + first_, static_cast<int>(last_ - first_));
-    }
-    void consume(std::size_t bytes) noexcept {
-        while (bytes > 0) {
-            iovec& piece = pieces_[first_];
-            const std::size_t part = std::min(bytes, piece.iov_len);
-            piece.iov_base = static_cast<char*>(piece.iov_base) + part;
-            piece.iov_len -= part;
-            bytes -= part;
-            if (piece.iov_len == 0) ++first_;
-        }
-    }
-
-private:
-    void add(const void* data, std::size_t size) noexcept { pieces_[last_++] = {const_cast<void*>(data), size}; }
-
-    std::array<iovec, 3> pieces_{};
-    std::size_t first_ = 0, last_ = 0;
-};
-
-class Y4mWriter : public VideoWriter {
-public:
-    Y4mWriter(const VideoFormat& format, std::string header) : format_(format), header_(std::move(header)) {
-        if (!y4m_is_verbatim(format.pixel)) planar_.resize(frame_bytes(format));
-    }
-
-protected:
-    std::span<const std::uint8_t> samples(std::span<const std::uint8_t> frame) noexcept {
-        if (planar_.empty()) return frame;
-        y4m_samples(format_, frame, planar_);
-        return planar_;
-    }
-    [[nodiscard]] Pieces pieces(std::span<const std::uint8_t> samples_of_frame,
-                                bool with_stream_header) const noexcept {
-        Pieces all;
-        if (with_stream_header) all.add(header_);
-        all.add(kY4mFrameHeader);
-        all.add(samples_of_frame);
-        return all;
-    }
-
-private:
-    VideoFormat format_;
-    std::string header_;
-    std::vector<std::uint8_t> planar_;
-};
 
 // A file always ends with a whole frame: one that a full disk cut short is removed.
 class FileWriter final : public Y4mWriter {
@@ -79,13 +17,12 @@ public:
         : Y4mWriter(format, std::move(header)), fd_(std::move(fd)) {}
 
     void write_frame(std::span<const std::uint8_t> frame, const FrameStamp&, const WriteQueue&) noexcept override {
-        Pieces left = pieces(samples(frame), end_of_last_frame_ == 0);
+        Y4mPieces left = pieces(samples(frame), end_of_last_frame_ == 0);
         off_t end = end_of_last_frame_;
         while (!left.empty()) {
             const ssize_t n = left.write_to(fd_.get());
             if (n < 0 && errno == EINTR) continue;
             if (n <= 0) return take_back();
-            left.consume(static_cast<std::size_t>(n));
             end += n;
         }
         end_of_last_frame_ = end;
@@ -151,18 +88,14 @@ private:
     }
 
     Outcome write_to_reader(std::span<const std::uint8_t> data, const WriteQueue& queue) noexcept {
-        Pieces left = pieces(data, stream_header_due_);
+        Y4mPieces left = pieces(data, stream_header_due_);
         while (!left.empty()) {
             const ssize_t n = left.write_to(fd_.get());
-            if (n > 0) {
-                left.consume(static_cast<std::size_t>(n));
-            } else if (n < 0 && errno == EAGAIN) {
-                if (queue.time_left_ms() == 0) return Outcome::out_of_time;
-                pollfd fd{fd_.get(), POLLOUT, 0};
-                ::poll(&fd, 1, kPollPeriodMs);
-            } else if (n == 0 || errno != EINTR) {
-                return Outcome::reader_left;
-            }
+            if (n > 0 || (n < 0 && errno == EINTR)) continue;
+            if (n == 0 || errno != EAGAIN) return Outcome::reader_left;
+            if (queue.time_left_ms() == 0) return Outcome::out_of_time;
+            pollfd fd{fd_.get(), POLLOUT, 0};
+            ::poll(&fd, 1, kPollPeriodMs);
         }
         stream_header_due_ = false;
         return Outcome::written;
@@ -175,19 +108,20 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<VideoSink>> open_y4m_sink(const std::string& path, bool fifo, const VideoFormat& format,
-                                                 WhenFull full) {
-    Result<std::string> header = y4m_stream_header(format);
+VideoSinkResult open_y4m_file(const std::string& path, const VideoSinkOptions& o) {
+    Result<std::string> header = y4m_stream_header(o.format);
     if (!header) return Error{header.error().what, path};
-    std::unique_ptr<VideoWriter> writer;
-    if (fifo) {
-        writer = std::make_unique<FifoWriter>(path, format, *header, full == WhenFull::wait);
-    } else {
-        Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-        if (!fd) return Error{std::string("cannot write: ") + std::strerror(errno), path, 0, 0, ErrorKind::missing};
-        writer = std::make_unique<FileWriter>(std::move(fd), format, *header);
-    }
-    return queued_sink(std::move(writer), format, full, (fifo ? "Y4M to FIFO " : "Y4M to ") + path);
+    Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (!fd) return Error{std::string("cannot write: ") + std::strerror(errno), path, 0, 0, ErrorKind::missing};
+    return queued_sink(std::make_unique<FileWriter>(std::move(fd), o.format, *header), o.format, o.full,
+                       "Y4M to " + path);
+}
+
+VideoSinkResult open_y4m_fifo(const std::string& path, const VideoSinkOptions& o) {
+    Result<std::string> header = y4m_stream_header(o.format);
+    if (!header) return Error{header.error().what, path};
+    return queued_sink(std::make_unique<FifoWriter>(path, o.format, *header, o.full == WhenFull::wait), o.format,
+                       o.full, "Y4M to FIFO " + path);
 }
 
 }  // namespace narpa

@@ -126,7 +126,7 @@ private:
 
 }  // namespace
 
-Result<std::unique_ptr<VideoSource>> open_y4m_source(const std::string& path, const VideoFormat& format) {
+VideoSourceResult open_y4m_source(const std::string& path, const VideoFormat& format) {
     const Result<std::string> header = y4m_stream_header(format);
     if (!header) return Error{header.error().what, path};
     // O_NONBLOCK: a FIFO opens without a writer.

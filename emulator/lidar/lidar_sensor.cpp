@@ -10,19 +10,6 @@
 namespace narpa {
 namespace {
 
-Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file) {
-    if (!has_bus) return Error{fmt::format("--lidar {}=can needs --can BUS", lidar.name)};
-    const LidarSpec& spec = lidar.model->spec();
-    const double shots_hz =
-        1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
-    if (shots_hz <= LidarSensor::kMaxBeams_hz) return Ok{};
-    return Error{
-        fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
-                    "frames)",
-                    lidar.name, shots_hz, LidarSensor::kMaxBeams_hz),
-        file};
-}
-
 }  // namespace
 
 Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
@@ -32,7 +19,8 @@ Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
         const Lidar& lidar = scene.lidars[i];
         auto packets = o.lidar;
         const auto to_can = [&](const auto& output) {
-            return output.second == "can" && output.first == lidar.name;
+            const DeviceKind* kind = packet_sink_kind(output.second);
+            return kind != nullptr && kind->destination == Destination::bus && output.first == lidar.name;
         };
         const bool beams = std::erase_if(packets, to_can) > 0;
         if (beams)
@@ -142,6 +130,19 @@ Status LidarSensor::finish() {
     Status sent = finish_all(sinks_);
     const Status logged = log_ ? log_->close(lost()) : Status{Ok{}};
     return sent ? logged : sent;
+}
+
+Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file) {
+    if (!has_bus) return Error{fmt::format("--lidar {}=can needs --can BUS", lidar.name)};
+    const LidarSpec& spec = lidar.model->spec();
+    const double shots_hz =
+        1e9 * static_cast<double>(spec.shots_per_packet) / static_cast<double>(spec.packet_period_ns);
+    if (shots_hz <= LidarSensor::kMaxBeams_hz) return Ok{};
+    return Error{
+        fmt::format("--lidar {}=can: it fires {:.0f} shots a second, expected at most {:g} (each takes four CAN "
+                    "frames)",
+                    lidar.name, shots_hz, LidarSensor::kMaxBeams_hz),
+        file};
 }
 
 }  // namespace narpa

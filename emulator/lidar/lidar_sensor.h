@@ -81,5 +81,7 @@ private:
 
 /// SensorKind::open.
 Status open_lidars(const World& world, const RunOptions& options, OpenSensors& out);
+/// An Error unless each shot of this LiDAR can be reported on the run's CAN bus. `file`: the scene's.
+[[nodiscard]] Status check_beams_on_can(const Lidar& lidar, bool has_bus, const std::string& file);
 
 }  // namespace narpa

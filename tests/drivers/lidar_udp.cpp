@@ -326,8 +326,8 @@ TEST(PacketSink, NoneCounts) {
 
 TEST(PacketSink, BadSinksSayWhatIsWrong) {
     const std::pair<const char*, const char*> cases[] = {
-        {"", "expected udp:HOST:PORT, FILE.pcap, ouster:PORT, or none"},
-        {"tcp:127.0.0.1:2368", "expected udp:HOST:PORT, FILE.pcap, ouster:PORT, or none"},
+        {"", "expected udp:HOST:PORT, FILE.pcap, ouster:PORT, can, or none"},
+        {"tcp:127.0.0.1:2368", "expected udp:HOST:PORT, FILE.pcap, ouster:PORT, can, or none"},
         {"udp:127.0.0.1", "expected udp:HOST:PORT, as in udp:127.0.0.1:2368"},
         {"udp::2368", "expected udp:HOST:PORT, as in udp:127.0.0.1:2368"},
         {"udp:127.0.0.1:", "expected a data port from 1 to 59595"},

@@ -1,6 +1,8 @@
 /// tests/drivers/video_support.h - frames that are told apart, and files of them.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -10,6 +12,7 @@
 #include <vector>
 
 #include "base/pixel_format.h"
+#include "protocols/video/y4m.h"
 
 namespace narpa::test {
 
@@ -47,6 +50,34 @@ bool eventually(Condition condition) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return false;
+}
+
+/// The frames of a stream; fails unless it is one header and whole frames.
+inline std::vector<Bytes> frames_of(const Bytes& stream, const VideoFormat& format) {
+    const std::string header = *y4m_stream_header(format) + std::string(kY4mFrameHeader);
+    const std::size_t size = frame_bytes(format);
+    const std::string text(stream.begin(), stream.end());
+    std::vector<Bytes> frames;
+    std::size_t at = header.size() - kY4mFrameHeader.size();
+    if (!text.starts_with(header)) {
+        ADD_FAILURE() << "no stream header, but: " << text.substr(0, 40);
+        return frames;
+    }
+    for (; at < text.size(); at += kY4mFrameHeader.size() + size) {
+        if (text.compare(at, kY4mFrameHeader.size(), kY4mFrameHeader) != 0 ||
+            text.size() < at + kY4mFrameHeader.size() + size) {
+            ADD_FAILURE() << "torn frame " << frames.size();
+            return frames;
+        }
+        Bytes frame(size);
+        frame_from_y4m(format, std::span(stream).subspan(at + kY4mFrameHeader.size(), size), frame);
+        frames.push_back(std::move(frame));
+    }
+    return frames;
+}
+
+inline std::size_t stream_bytes(const VideoFormat& format, std::size_t frames) {
+    return y4m_stream_header(format)->size() + frames * (kY4mFrameHeader.size() + frame_bytes(format));
 }
 
 }  // namespace narpa::test

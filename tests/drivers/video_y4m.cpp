@@ -14,7 +14,7 @@
 namespace narpa {
 namespace {
 
-using test::Bytes, test::noise_frame;
+using test::Bytes, test::noise_frame, test::frames_of, test::stream_bytes;
 
 constexpr VideoFormat kGrey{64, 48, PixelFormat::grey, 100'000'000};
 constexpr VideoFormat kBig{640, 480, PixelFormat::grey, 100'000'000};  // more than a pipe holds
@@ -23,30 +23,6 @@ std::unique_ptr<VideoSink> opened(const std::string& spec, const VideoFormat& fo
     auto sink = open_video_sink(spec, format, full);
     EXPECT_TRUE(sink) << sink.error().text();
     return sink ? std::move(*sink) : nullptr;
-}
-
-// The frames of a stream; fails unless it is one header and whole frames.
-std::vector<Bytes> frames_of(const Bytes& stream, const VideoFormat& format) {
-    const std::string header = *y4m_stream_header(format) + std::string(kY4mFrameHeader);
-    const std::size_t size = frame_bytes(format);
-    const std::string text(stream.begin(), stream.end());
-    std::vector<Bytes> frames;
-    std::size_t at = header.size() - kY4mFrameHeader.size();
-    if (!text.starts_with(header)) {
-        ADD_FAILURE() << "no stream header, but: " << text.substr(0, 40);
-        return frames;
-    }
-    for (; at < text.size(); at += kY4mFrameHeader.size() + size) {
-        if (text.compare(at, kY4mFrameHeader.size(), kY4mFrameHeader) != 0 ||
-            text.size() < at + kY4mFrameHeader.size() + size) {
-            ADD_FAILURE() << "torn frame " << frames.size();
-            return frames;
-        }
-        Bytes frame(size);
-        frame_from_y4m(format, std::span(stream).subspan(at + kY4mFrameHeader.size(), size), frame);
-        frames.push_back(std::move(frame));
-    }
-    return frames;
 }
 
 // A reader of a FIFO, in the test's own thread.
@@ -84,10 +60,6 @@ std::string make_fifo(const test::TemporaryFolder& folder) {
     const std::string path = folder / "fifo";
     EXPECT_EQ(::mkfifo(path.c_str(), 0600), 0);
     return path;
-}
-
-std::size_t stream_bytes(const VideoFormat& format, std::size_t frames) {
-    return y4m_stream_header(format)->size() + frames * (kY4mFrameHeader.size() + frame_bytes(format));
 }
 
 TEST(Y4mSink, FfmpegReadsTheFileByteForByte) {
@@ -299,7 +271,7 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
         std::string says;
     } cases[] = {
         {"nowhere", kGrey, ErrorKind::bad_input,
-         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], FILE.y4m, an existing FIFO, or none"},
+         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, FILE.y4m, an existing FIFO, or none"},
         {"", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "out.y4m", {8, 8, PixelFormat::rgb24, 1}, ErrorKind::bad_input, "it holds GREY, Y16 and YUYV"},
         {folder / "out.y4m", {8, 8, PixelFormat::bggr16, 1}, ErrorKind::bad_input, "cannot hold BGGR16 frames"},

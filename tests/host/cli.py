@@ -324,6 +324,24 @@ def check_replay():
         expect(document["passed"] and sorted(replayed) == sorted(cameras), f"--json has {replayed}")
 
 
+def check_devices():
+    """check takes the devices of run by the same options, and others where they can be only one thing."""
+    film = folder / "films/nav.y4m"
+    done = narpa("check", support.SCENE, "--can", "slcan:0", "--video", f"{support.CAMERA}={film}", "--video", f"{support.CAMERA}=tcp:0",
+                 "--lidar", f"{support.LIDAR}=udp:127.0.0.1:2368", "--lidar", f"{support.LIDAR}=none", "tcp:0", "--json")
+    found = {f["name"]: f["there"] for f in json.loads(done.stdout)["machine"]}
+    expect(all(found[name] for name in ("slcan:0", str(film), "tcp:0", "udp:127.0.0.1:2368", "none")), f"check finds {found}")
+    expect(not film.parent.exists(), "check makes no file")
+    expect_refusal(2, "udp:239.74.163.2: needs the option that says what it is, expected --can udp:239.74.163.2 or --lidar LIDAR=udp:239.74.163.2", "check", support.SCENE, "udp:239.74.163.2")
+    expect_refusal(2, 'no camera named "eye"', "check", support.SCENE, "--video", "eye=none")
+    expect_refusal(2, f"--lidar {support.LIDAR}=can", "check", support.SCENE, "--lidar", f"{support.LIDAR}=can")
+    expect_refusal(2, "expected /dev/videoN", "check", support.SCENE, "--video", f"{support.CAMERA}=film.mov")
+    done = narpa("check", support.SCENE, "--video", f"{support.CAMERA}=/dev/video99", "--can", "can77", "--json", status=3)
+    expect({"can77", "/dev/video99"} <= {f["name"] for f in json.loads(done.stdout)["machine"] if not f["there"]}, "check names missing ones")
+    said = narpa("run", "--help").stdout.decode()
+    expect(said.count("tcp:[ADDRESS:]PORT") == 1 and "ouster:[ADDRESS:]PORT" in said and "log:FILE" in said, "run --help lists the kinds")
+
+
 def check_folders():
     """A log folder accepts one run at a time."""
     log = folder / "one-log"
@@ -333,5 +351,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_gone, check_replay, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_gone, check_replay, check_devices, check_folders):
     check()

@@ -1,0 +1,80 @@
+#!/usr/bin/python3
+"""ffmpeg, OpenCV and GStreamer read the sink tcp: of a run, all at once, byte for byte."""
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import support
+from support import expect
+
+POSES = support.flight(4)
+
+OPENCV_READER = """
+import cv2, sys
+video = cv2.VideoCapture(sys.argv[1], cv2.CAP_FFMPEG)
+out = open(sys.argv[2], "wb")
+while True:
+    good, picture = video.read()
+    if not good: break
+    out.write(cv2.split(picture)[0].tobytes())
+"""
+
+
+def has_gstreamer():
+    return shutil.which("gst-inspect-1.0") and subprocess.run(["gst-inspect-1.0", "--exists", "y4mdec"]).returncode == 0
+
+
+def readers(port, folder):
+    """Name, command and output file of each reader that this machine has."""
+    url, all_readers = f"tcp://127.0.0.1:{port}", {}
+    if shutil.which("ffmpeg"):
+        all_readers["ffmpeg"] = ["ffmpeg", "-v", "error", "-nostdin", "-i", url, "-f", "rawvideo", "-fps_mode", "passthrough",
+                                 "-pix_fmt", "gray", folder / "ffmpeg"]
+    if importlib.util.find_spec("cv2"):
+        all_readers["OpenCV"] = [sys.executable, "-c", OPENCV_READER, url, folder / "OpenCV"]
+    if has_gstreamer():
+        all_readers["GStreamer"] = ["gst-launch-1.0", "-q", "tcpclientsrc", "host=127.0.0.1", f"port={port}", "!", "y4mdec", "!",
+                                    "filesink", f"location={folder / 'GStreamer'}"]
+    for name in sorted({"ffmpeg", "OpenCV", "GStreamer"} - all_readers.keys()):
+        print(f"without {name}; try: apt-get install ffmpeg python3-opencv gstreamer1.0-tools gstreamer1.0-plugins-bad")
+    return all_readers
+
+
+def connections(port):
+    """Established connections to a port of the loopback."""
+    rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+    return sum(row[1] == f"0100007F:{port:04X}" and row[3] == "01" for row in rows)
+
+
+folder = support.work_folder()
+scene = support.scene_with(folder, "GREY")
+port, can_port = support.free_port(), support.free_port()
+commands = readers(port, folder)
+if not commands:
+    support.skip("no ffmpeg, no OpenCV for Python and no y4mdec of GStreamer")
+wire = support.Wire()
+with support.Run(scene, "--can", f"slcan:{can_port}", "--video", f"{support.CAMERA}=tcp:{port}", "--lockstep") as run:
+    run.wait_for(re.escape(f"Y4M at tcp://127.0.0.1:{port}"))
+    started = {name: subprocess.Popen(list(map(str, command))) for name, command in commands.items()}
+    for _ in range(1200):
+        if connections(port) == len(started):
+            break
+        time.sleep(0.05)
+    expect(connections(port) == len(started), f"{', '.join(started)} connect")
+    bus = support.open_bus(run, interface="slcan", channel=f"socket://127.0.0.1:{can_port}", sleep_after_open=0.1)
+    for frame, pose in enumerate(POSES):
+        for message in wire.command(pose, frame * support.PERIOD_NS, counter=frame):
+            bus.send(message)
+        support.await_ledger(bus, wire, frame)
+    bus.shutdown()
+    print(run.stop()["cameras"][0]["sinks"])
+wanted = [support.render(scene, frame, pose, folder) for frame, pose in enumerate(POSES)]
+size = support.WIDTH * support.HEIGHT
+for name, reader in started.items():
+    expect(reader.wait(timeout=120) == 0, f"{name} ends well")
+    data = (folder / name).read_bytes()
+    support.expect_frames([data[i : i + size] for i in range(0, len(data), size)], wanted, f"{name}, tcp:")

@@ -11,16 +11,18 @@
 namespace narpa {
 namespace {
 
-constexpr std::int64_t kPacket_ns = static_cast<std::int64_t>(LivoxPacket::kPoints) * LivoxPacket::kPoint_ns;
-constexpr std::int64_t kFrame_ns = 100'000'000;
-constexpr double kPoints_hz = 1e9 / LivoxPacket::kPoint_ns;
-constexpr double kMetresPerStep = 1e-3;
-constexpr int kLines = 4;
+constexpr std::int64_t kLivoxPacket_ns = static_cast<std::int64_t>(LivoxPacket::kPoints) * LivoxPacket::kPoint_ns;
+constexpr std::int64_t kLivoxFrame_ns = 100'000'000;
+constexpr double kLivoxPoints_hz = 1e9 / LivoxPacket::kPoint_ns;
+constexpr double kLivoxStep_m = 1e-3;
+constexpr int kLivoxLines = 4;
 constexpr std::uint8_t kCartesian32 = 1, kPtp = 1;
 // Offsets of the header's fields.
-constexpr std::size_t kVersion = 0, kLength = 1, kTimeInterval = 3, kDotNum = 5, kUdpCount = 7, kFrameCount = 9,
-                      kDataType = 10, kTimeType = 11, kCrc = 24, kTimestamp = 28;
-static_assert(kTimestamp + 8 == LivoxPacket::kHeaderBytes && LivoxPacket::kBytes == 1380);
+struct LivoxAt {
+    static constexpr std::size_t kVersion = 0, kLength = 1, kTimeInterval = 3, kDotNum = 5, kUdpCount = 7,
+                                 kFrameCount = 9, kDataType = 10, kTimeType = 11, kCrc = 24, kTimestamp = 28;
+};
+static_assert(LivoxAt::kTimestamp + 8 == LivoxPacket::kHeaderBytes && LivoxPacket::kBytes == 1380);
 constexpr auto kTimeInterval_100ns =  // from the first point to the last
     static_cast<std::uint16_t>((LivoxPacket::kPoints - 1) * LivoxPacket::kPoint_ns / 100);
 
@@ -35,19 +37,19 @@ std::uint8_t reflectivity_code_of(float reflectivity) noexcept {
 
 /// In steps of a millimetre, along the maker's axes.
 std::array<std::uint32_t, 3> millimetres(const Vec3& p) noexcept {
-    const auto steps = [](double m) { return static_cast<std::uint32_t>(std::lround(m / kMetresPerStep)); };
+    const auto steps = [](double m) { return static_cast<std::uint32_t>(std::lround(m / kLivoxStep_m)); };
     return {steps(p.y), steps(-p.x), steps(p.z)};
 }
 
 LidarSpec spec_of() {
     return {.name = "Mid-360",
             .rate_hz = LivoxRosette::kTurns_hz,
-            .packet_period_ns = kPacket_ns,
+            .packet_period_ns = kLivoxPacket_ns,
             .shots_per_packet = LivoxPacket::kPoints,
             .points_per_packet = LivoxPacket::kPoints,
             .data_packet_bytes = LivoxPacket::kBytes,
             .range_m_max = 2e6,  // coordinates have 32 bits
-            .range_resolution_m = kMetresPerStep,
+            .range_resolution_m = kLivoxStep_m,
             .network = mid360().network};
 }
 
@@ -56,7 +58,7 @@ public:
     Mid360() : LidarModel(spec_of()) {}
 
     [[nodiscard]] std::int64_t sweep(std::int64_t packet) const noexcept override {
-        return packet * kPacket_ns / kFrame_ns;
+        return packet * kLivoxPacket_ns / kLivoxFrame_ns;
     }
 
     void shots(std::int64_t packet, std::span<LidarShot> out) const noexcept override {
@@ -68,7 +70,7 @@ public:
                       .direction = d,
                       .azimuth_rad = std::atan2(d.x, d.y),
                       .elevation_rad = std::asin(d.z),
-                      .beam = static_cast<int>(i) % kLines};
+                      .beam = static_cast<int>(i) % kLivoxLines};
         }
     }
 
@@ -77,23 +79,23 @@ public:
         assert(echoes.size() == LivoxPacket::kPoints && out.size() == LivoxPacket::kBytes);
         std::ranges::fill(out, std::uint8_t{0});
         const std::int64_t frame = sweep(packet);
-        const std::int64_t first = (frame * kFrame_ns + kPacket_ns - 1) / kPacket_ns;
-        put_le(&out[kLength], static_cast<std::uint16_t>(LivoxPacket::kBytes));
-        put_le(&out[kTimeInterval], kTimeInterval_100ns);
-        put_le(&out[kDotNum], static_cast<std::uint16_t>(LivoxPacket::kPoints));
-        put_le(&out[kUdpCount], static_cast<std::uint16_t>(packet - first));
-        out[kFrameCount] = static_cast<std::uint8_t>(frame);
-        out[kDataType] = kCartesian32;
-        out[kTimeType] = kPtp;
-        put_le(&out[kTimestamp], static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet)));
+        const std::int64_t first = (frame * kLivoxFrame_ns + kLivoxPacket_ns - 1) / kLivoxPacket_ns;
+        put_le(&out[LivoxAt::kLength], static_cast<std::uint16_t>(LivoxPacket::kBytes));
+        put_le(&out[LivoxAt::kTimeInterval], kTimeInterval_100ns);
+        put_le(&out[LivoxAt::kDotNum], static_cast<std::uint16_t>(LivoxPacket::kPoints));
+        put_le(&out[LivoxAt::kUdpCount], static_cast<std::uint16_t>(packet - first));
+        out[LivoxAt::kFrameCount] = static_cast<std::uint8_t>(frame);
+        out[LivoxAt::kDataType] = kCartesian32;
+        out[LivoxAt::kTimeType] = kPtp;
+        put_le(&out[LivoxAt::kTimestamp], static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet)));
         for (std::size_t i = 0; i < echoes.size(); ++i) put_point(packet, i, echoes[i].strongest, out);
-        put_le(&out[kCrc], crc32(out.subspan(kTimestamp)));
+        put_le(&out[LivoxAt::kCrc], crc32(out.subspan(LivoxAt::kTimestamp)));
     }
 
     std::optional<std::int64_t> packet_time(std::span<const std::uint8_t> bytes,
                                             std::int64_t) const noexcept override {
         if (!is_ours(bytes)) return std::nullopt;
-        return static_cast<std::int64_t>(get_le<std::uint64_t>(&bytes[kTimestamp]));
+        return static_cast<std::int64_t>(get_le<std::uint64_t>(&bytes[LivoxAt::kTimestamp]));
     }
 
     std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept override {
@@ -102,7 +104,7 @@ public:
         for (std::size_t i = 0; i < LivoxPacket::kPoints; ++i) {
             const std::uint8_t* const at = &bytes[LivoxPacket::kHeaderBytes + i * LivoxPacket::kPointBytes];
             const auto axis = [at](std::size_t k) {
-                return kMetresPerStep * static_cast<std::int32_t>(get_le<std::uint32_t>(at + 4 * k));
+                return kLivoxStep_m * static_cast<std::int32_t>(get_le<std::uint32_t>(at + 4 * k));
             };
             const Vec3 p{-axis(1), axis(0), axis(2)};
             const double range = norm(p);
@@ -113,7 +115,7 @@ public:
             point.range_m = range;
             point.t_offset_ns = static_cast<std::int64_t>(i) * LivoxPacket::kPoint_ns;
             point.intensity = at[12];
-            point.beam = static_cast<int>(i) % kLines;
+            point.beam = static_cast<int>(i) % kLivoxLines;
             point.shot = static_cast<int>(i);
         }
         return count;
@@ -123,7 +125,7 @@ private:
     /// A point without an echo has zero coordinates.
     static void put_point(std::int64_t packet, std::size_t i, const LidarEcho& echo,
                           std::span<std::uint8_t> out) noexcept {
-        if (!(echo.range_m >= 0.5 * kMetresPerStep && echo.range_m <= 2e6)) return;
+        if (!(echo.range_m >= 0.5 * kLivoxStep_m && echo.range_m <= 2e6)) return;
         const std::int64_t n = packet * static_cast<std::int64_t>(LivoxPacket::kPoints);
         const auto steps = millimetres(echo.range_m * LivoxRosette::direction(n + static_cast<std::int64_t>(i)));
         std::uint8_t* const at = &out[LivoxPacket::kHeaderBytes + i * LivoxPacket::kPointBytes];
@@ -132,11 +134,12 @@ private:
     }
 
     [[nodiscard]] static bool is_ours(std::span<const std::uint8_t> bytes) noexcept {
-        return bytes.size() == LivoxPacket::kBytes && bytes[kVersion] == 0 &&
-               get_le<std::uint16_t>(&bytes[kLength]) == LivoxPacket::kBytes &&
-               get_le<std::uint16_t>(&bytes[kDotNum]) == LivoxPacket::kPoints && bytes[kDataType] == kCartesian32 &&
-               get_le<std::uint64_t>(&bytes[kTimestamp]) >> 63 == 0 &&
-               get_le<std::uint32_t>(&bytes[kCrc]) == crc32(bytes.subspan(kTimestamp));
+        return bytes.size() == LivoxPacket::kBytes && bytes[LivoxAt::kVersion] == 0 &&
+               get_le<std::uint16_t>(&bytes[LivoxAt::kLength]) == LivoxPacket::kBytes &&
+               get_le<std::uint16_t>(&bytes[LivoxAt::kDotNum]) == LivoxPacket::kPoints &&
+               bytes[LivoxAt::kDataType] == kCartesian32 &&
+               get_le<std::uint64_t>(&bytes[LivoxAt::kTimestamp]) >> 63 == 0 &&
+               get_le<std::uint32_t>(&bytes[LivoxAt::kCrc]) == crc32(bytes.subspan(LivoxAt::kTimestamp));
     }
 };
 
@@ -144,7 +147,7 @@ private:
 
 Vec3 LivoxRosette::direction(std::int64_t n) noexcept {
     const auto angle = [n](double cycles_hz) {
-        const double cycles = static_cast<double>(n) * (cycles_hz / kPoints_hz);
+        const double cycles = static_cast<double>(n) * (cycles_hz / kLivoxPoints_hz);
         return 2 * std::numbers::pi * (cycles - std::floor(cycles));
     };
     constexpr double kMiddle_deg = 0.5 * (kHighest_deg + kLowest_deg),

@@ -11,7 +11,7 @@ namespace {
 constexpr double kLidar_m = 905e-9;
 
 /// An error of 1 % suffices: the light only adds shot noise, which goes with its square root.
-AirResolution resolution_of(const Atmosphere& a) {
+AirResolution lidar_resolution_of(const Atmosphere& a) {
     AirResolution r;
     r.steps = std::min(a.steps, 8);
     r.heights = 12;
@@ -23,7 +23,7 @@ AirResolution resolution_of(const Atmosphere& a) {
 AirForLidar::AirForLidar(const Scene& scene, int threads)
     : planet_(scene), sun_(scene.sun), air_(scene.atmosphere->air, kLidar_m, scene.atmosphere->steps) {
     if (sun_ && std::ranges::any_of(scene.lidars, sees_sunlight))
-        sunlight_.emplace(Air(scene.atmosphere->air, kLidar_m), resolution_of(*scene.atmosphere),
+        sunlight_.emplace(Air(scene.atmosphere->air, kLidar_m), lidar_resolution_of(*scene.atmosphere),
                           0.5 * sun_->angular_diameter_rad, threads);
 }
 

@@ -31,16 +31,16 @@ double disk_function(double n_l, double n_v, double l_v) noexcept {
         0.0, std::cos(0.5 * phase) * terminator / cos_longitude * std::pow(cos_latitude, phase / (kPi - phase)));
 }
 
-Rgb f(const Surface& s, const BsdfGeometry& g) noexcept {
+Rgb akimov_f(const Surface& s, const BsdfGeometry& g) noexcept {
     return s.diffuse * static_cast<float>(disk_function(g.n_l, g.n_v, g.l_v) / (kPi * g.n_l));
 }
 
 // f n.l is bounded: directions are sampled evenly over the hemisphere.
-double pdf(const Surface&, const BsdfGeometry&) noexcept {
+double akimov_pdf(const Surface&, const BsdfGeometry&) noexcept {
     return 0.5 / kPi;
 }
 
-Vec3 direction(const Surface&, const Vec3& n, const Vec3&, const Random3& u) noexcept {
+Vec3 akimov_direction(const Surface&, const Vec3& n, const Vec3&, const Random3& u) noexcept {
     return Basis(n).to_world(direction_at(1 - u[1], u[2]));
 }
 
@@ -52,9 +52,9 @@ constinit const BsdfKind kinds::akimov{
     .name = "akimov",
     .keys = kAlbedoKeys,
     .read = read_albedo,
-    .f = f,
-    .pdf = pdf,
-    .direction = direction,
+    .f = akimov_f,
+    .pdf = akimov_pdf,
+    .direction = akimov_direction,
     .ambient = [](const Surface& s) noexcept { return s.diffuse * 1.3721f; },
     .largest_albedo = [](const Material& m) noexcept { return m.diffuse * 1.697f; },
     .energy_key = "albedo"};

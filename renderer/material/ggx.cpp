@@ -18,9 +18,9 @@
 namespace narpa {
 namespace {
 
-constexpr std::string_view kKeys[] = {"albedo", "texture", "metallic", "roughness", "ior", "fresnel"};
+constexpr std::string_view kGgxKeys[] = {"albedo", "texture", "metallic", "roughness", "ior", "fresnel"};
 
-void read(TableReader& table, Material& m) {
+void ggx_read(TableReader& table, Material& m) {
     read_albedo(table, m);
     m.metallic = static_cast<float>(table.number("metallic", kUnit).value_or(m.metallic));
     m.roughness = static_cast<float>(table.number("roughness", kUnit).value_or(m.roughness));
@@ -33,7 +33,7 @@ constexpr double kMinRoughness = 0.01;
 /// Multiple scattering below this mean is ignored: it would only give rare bright samples.
 constexpr double kMinMultiple = 1e-3;
 /// Lower densities occur only by rounding, and could overflow the weight.
-constexpr double kMinDensity = 1e-30;
+constexpr double kGgxMinDensity = 1e-30;
 
 /// Quantities that depend on neither l nor v.
 struct Ggx {
@@ -157,26 +157,26 @@ struct SeenGgx : Ggx {
     }
 };
 
-Rgb f(const Surface& s, const BsdfGeometry& g) noexcept {
+Rgb ggx_f(const Surface& s, const BsdfGeometry& g) noexcept {
     return SeenGgx(s, g.n, g.v).f(g.l);
 }
 
-double pdf(const Surface& s, const BsdfGeometry& g) noexcept {
+double ggx_pdf(const Surface& s, const BsdfGeometry& g) noexcept {
     return SeenGgx(s, g.n, g.v).pdf(g.l);
 }
 
-BsdfSample sample(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
+BsdfSample ggx_sample(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
     const SeenGgx g(s, n, v);
     BsdfSample out;
     out.l = g.direction(u);
     const double n_l = dot(n, out.l);
     if (n_l <= 0) return out;
     out.pdf = g.pdf(out.l);
-    if (out.pdf > kMinDensity) out.weight = g.f(out.l) * static_cast<float>(n_l / out.pdf);
+    if (out.pdf > kGgxMinDensity) out.weight = g.f(out.l) * static_cast<float>(n_l / out.pdf);
     return out;
 }
 
-Rgb ambient(const Surface& s) noexcept {
+Rgb ggx_ambient(const Surface& s) noexcept {
     const Ggx g(s);
     const float mean = static_cast<float>(g.albedo.mean()),
                 power = static_cast<float>(g.albedo.mean_schlick_power());
@@ -188,19 +188,19 @@ Rgb ambient(const Surface& s) noexcept {
 }
 
 /// A bound: white metal reflects all.
-Rgb largest_albedo(const Material& m) noexcept {
+Rgb ggx_largest_albedo(const Material& m) noexcept {
     return {std::max(m.diffuse.x, 1.0f), std::max(m.diffuse.y, 1.0f), std::max(m.diffuse.z, 1.0f)};
 }
 
 }  // namespace
 
 constinit const BsdfKind kinds::ggx{.name = "ggx",
-                                    .keys = kKeys,
-                                    .read = read,
-                                    .f = f,
-                                    .pdf = pdf,
-                                    .sample = sample,
-                                    .ambient = ambient,
-                                    .largest_albedo = largest_albedo};
+                                    .keys = kGgxKeys,
+                                    .read = ggx_read,
+                                    .f = ggx_f,
+                                    .pdf = ggx_pdf,
+                                    .sample = ggx_sample,
+                                    .ambient = ggx_ambient,
+                                    .largest_albedo = ggx_largest_albedo};
 
 }  // namespace narpa

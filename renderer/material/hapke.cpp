@@ -14,10 +14,10 @@
 namespace narpa {
 namespace {
 
-constexpr std::string_view kKeys[] = {"albedo",       "texture",      "b", "c", "opposition_b0",
-                                      "opposition_h", "roughness_deg"};
+constexpr std::string_view kHapkeKeys[] = {"albedo",       "texture",      "b", "c", "opposition_b0",
+                                           "opposition_h", "roughness_deg"};
 
-void read(TableReader& table, Material& m) {
+void hapke_read(TableReader& table, Material& m) {
     const auto number = [&table](const char* key, const Range& range, float& value) {
         value = static_cast<float>(table.number(key, range).value_or(value));
     };
@@ -93,7 +93,7 @@ double multiple_share(const Surface& s) {
     return 0.15 + 0.6 * std::clamp(band_mean(s.diffuse), 0.0, 1.0);
 }
 
-Rgb f(const Surface& s, const BsdfGeometry& cosines) noexcept {
+Rgb hapke_f(const Surface& s, const BsdfGeometry& cosines) noexcept {
     const Hapke& h = s.material->hapke;
     const RoughGeometry g =
         rough_geometry(static_cast<double>(h.roughness_rad), cosines.n_l, cosines.n_v, cosines.l_v);
@@ -111,14 +111,14 @@ Rgb f(const Surface& s, const BsdfGeometry& cosines) noexcept {
     return {x, y, w.z == w.x ? x : w.z == w.y ? y : band(w.z)};
 }
 
-double pdf(const Surface& s, const BsdfGeometry& g) noexcept {
+double hapke_pdf(const Surface& s, const BsdfGeometry& g) noexcept {
     const Hapke& h = s.material->hapke;
     const double mirrored = g.l_v - 2 * g.n_l * g.n_v, share = multiple_share(s);
     const double single = (double_henyey_greenstein(h, g.l_v) + double_henyey_greenstein(h, mirrored)) / (4 * kPi);
     return (1 - share) * single + share * g.n_l / kPi;
 }
 
-Vec3 direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
+Vec3 hapke_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
     const Hapke& h = s.material->hapke;
     const double share = multiple_share(s), b = static_cast<double>(h.phase_b), c = static_cast<double>(h.phase_c);
     if (u[0] < share) return cosine_direction(n, u[1], u[2]);
@@ -130,7 +130,7 @@ Vec3 direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u)
 // Single scattering: that of a Lommel-Seeliger sphere. Multiple scattering: that of isotropic scatterers (Hapke
 // 2012, chapter 11, within 0.3 per cent). The narrow opposition peak and shadowing by roughness are left out: an
 // upper bound except for that peak.
-Rgb ambient(const Surface& s) noexcept {
+Rgb hapke_ambient(const Surface& s) noexcept {
     const Hapke& h = s.material->hapke;
     const double b = static_cast<double>(h.phase_b), c = static_cast<double>(h.phase_c);
     const double single =
@@ -146,12 +146,12 @@ Rgb ambient(const Surface& s) noexcept {
 }  // namespace
 
 constinit const BsdfKind kinds::hapke{.name = "hapke",
-                                      .keys = kKeys,
-                                      .read = read,
-                                      .f = f,
-                                      .pdf = pdf,
-                                      .direction = direction,
-                                      .ambient = ambient,
+                                      .keys = kHapkeKeys,
+                                      .read = hapke_read,
+                                      .f = hapke_f,
+                                      .pdf = hapke_pdf,
+                                      .direction = hapke_direction,
+                                      .ambient = hapke_ambient,
                                       .energy_key = "albedo"};
 
 }  // namespace narpa

@@ -7,19 +7,19 @@
 namespace narpa {
 namespace {
 
-constexpr std::string_view kKeys[] = {"albedo", "texture", "cloud_texture", "cloud_albedo"};
+constexpr std::string_view kLambertKeys[] = {"albedo", "texture", "cloud_texture", "cloud_albedo"};
 
-Rgb f(const Surface& s, const BsdfGeometry&) noexcept {
+Rgb lambert_f(const Surface& s, const BsdfGeometry&) noexcept {
     return s.diffuse * static_cast<float>(std::numbers::inv_pi);
 }
 
 }  // namespace
 
 constinit const BsdfKind kinds::lambert{.name = "lambert",
-                                        .keys = kKeys,
+                                        .keys = kLambertKeys,
                                         .read = read_albedo,
                                         .lambert_or_phong = true,
-                                        .f = f,
+                                        .f = lambert_f,
                                         .largest_albedo = [](const Material& m) noexcept { return m.diffuse; }};
 
 }  // namespace narpa

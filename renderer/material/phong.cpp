@@ -13,13 +13,13 @@
 namespace narpa {
 namespace {
 
-constexpr float kInvPi = static_cast<float>(1 / kPi);
+constexpr float kPhongInvPi = static_cast<float>(1 / kPi);
 constexpr std::string_view kPhongKeys[] = {"albedo",           "texture",       "specular",    "exponent",
                                            "specular_texture", "cloud_texture", "cloud_albedo"};
 constexpr std::string_view kClassicKeys[] = {"albedo",   "texture", "specular",
                                              "exponent", "ambient", "specular_texture"};
 
-void read(TableReader& table, Material& m) {
+void phong_read(TableReader& table, Material& m) {
     const std::string kind(m.kind->name);
     read_albedo(table, m);
     table.require("specular", "a number or [r, g, b] in [0, 1], as the kind is \"" + kind + "\"");
@@ -28,8 +28,8 @@ void read(TableReader& table, Material& m) {
     m.exponent = static_cast<float>(table.number("exponent", {.low = 0, .high = 1e4}).value_or(m.exponent));
 }
 
-void read_classic(TableReader& table, Material& m) {
-    read(table, m);
+void read_phong_classic(TableReader& table, Material& m) {
+    phong_read(table, m);
     m.ambient = table.rgb("ambient", kUnit).value_or(m.ambient);
 }
 
@@ -45,13 +45,13 @@ double lobe_density(double cosine, double exponent) {
     return cosine > 0 ? (exponent + 1) / (2 * kPi) * std::pow(std::min(cosine, 1.0), exponent) : 0;
 }
 
-Rgb f(const Surface& s, const BsdfGeometry& g) noexcept {
-    return s.diffuse * kInvPi + s.specular * phong_lobe(2 * g.n_l * g.n_v - g.l_v, s.exponent);
+Rgb phong_f(const Surface& s, const BsdfGeometry& g) noexcept {
+    return s.diffuse * kPhongInvPi + s.specular * phong_lobe(2 * g.n_l * g.n_v - g.l_v, s.exponent);
 }
 
 // Lobe directions below the surface are mirrored to above it: no sample is lost, and the density of a direction is
 // the sum of the lobe's there and in its mirror image.
-double pdf(const Surface& s, const BsdfGeometry& g) noexcept {
+double phong_pdf(const Surface& s, const BsdfGeometry& g) noexcept {
     const double share = lobe_share(s), exponent = static_cast<double>(s.exponent);
     const double cosine = (1 - share) * g.n_l / kPi;
     if (share <= 0) return cosine;
@@ -59,18 +59,18 @@ double pdf(const Surface& s, const BsdfGeometry& g) noexcept {
     return cosine + share * (lobe_density(above, exponent) + lobe_density(above - 2 * g.n_l * g.n_v, exponent));
 }
 
-Vec3 direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
+Vec3 phong_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
     if (u[0] >= lobe_share(s)) return cosine_direction(n, u[1], u[2]);
     const double cosine = std::pow(1 - u[1], 1 / (static_cast<double>(s.exponent) + 1));
     return folded(Basis(reflect(-v, n)).to_world(direction_at(cosine, u[2])), n);
 }
 
 // f (n.l) = (kd (n.l) + ks (r.v)^n) / pi. Below n.l = 1e-6 f stops growing: 0.2 arcsec above the horizon.
-Rgb classic_f(const Surface& s, const BsdfGeometry& g) noexcept {
+Rgb phong_classic_f(const Surface& s, const BsdfGeometry& g) noexcept {
     const double r_v = 2 * g.n_l * g.n_v - g.l_v;
-    if (r_v <= 0) return s.diffuse * kInvPi;
+    if (r_v <= 0) return s.diffuse * kPhongInvPi;
     const double lobe = std::pow(std::min(r_v, 1.0), static_cast<double>(s.exponent)) / std::max(g.n_l, 1e-6);
-    return (s.diffuse + s.material->specular * static_cast<float>(lobe)) * kInvPi;
+    return (s.diffuse + s.material->specular * static_cast<float>(lobe)) * kPhongInvPi;
 }
 
 Rgb unbounded(const Material&) noexcept {
@@ -83,22 +83,22 @@ Rgb unbounded(const Material&) noexcept {
 constinit const BsdfKind kinds::phong{
     .name = "phong",
     .keys = kPhongKeys,
-    .read = read,
+    .read = phong_read,
     .lambert_or_phong = true,
     .has_lobe = true,
-    .f = f,
-    .pdf = pdf,
-    .direction = direction,
+    .f = phong_f,
+    .pdf = phong_pdf,
+    .direction = phong_direction,
     .largest_albedo = [](const Material& m) noexcept { return m.diffuse + m.specular; },
     .energy_key = "specular"};
 
 constinit const BsdfKind kinds::phong_classic{
     .name = "phong_classic",
     .keys = kClassicKeys,
-    .read = read_classic,
+    .read = read_phong_classic,
     .has_lobe = true,
     .direct_only = true,
-    .f = classic_f,
+    .f = phong_classic_f,
     .ambient = [](const Surface& s) noexcept { return s.material->ambient; },
     .largest_albedo = unbounded};
 

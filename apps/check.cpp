@@ -31,6 +31,7 @@
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/kind_names.h"
 
 namespace narpa::cli {
@@ -104,7 +105,7 @@ Finding permission(std::string name, int resource, rlim_t needed, std::string_vi
 /// The number of materials of each kind.
 std::map<std::string_view, int> material_kinds(const Scene& scene) {
     std::map<std::string_view, int> count;
-    for (const Material& m : scene.materials) ++count[name_of(m.kind, kMaterialKinds)];
+    for (const Material& m : scene.materials) ++count[m.kind->name];
     return count;
 }
 

@@ -54,7 +54,7 @@ struct Point {
 Rgb brdf(const Point& p, const Vec3f& l) {
     const Material& m = *p.material;
     Rgb f = (1 / kPiFloat) * m.diffuse;
-    if (m.kind == Material::Kind::phong) {
+    if (m.kind == &kinds::phong) {
         const float cosine = 2 * dot(p.normal, l) * dot(p.normal, p.view) - dot(l, p.view);
         if (cosine > 0) f += ((m.exponent + 2) / (2 * kPiFloat) * std::pow(cosine, m.exponent)) * m.specular;
     }
@@ -286,7 +286,7 @@ std::uint64_t Loop::render(const Camera& camera, const RawAim& aim, const FrameS
 
 Result<ReferenceLoop> reference_loop(const Scene& scene, const BodyPoses& at) {
     for (const Material& m : scene.materials)
-        if (m.kind > Material::Kind::phong || is_textured(m))
+        if (!is_lambert_or_phong(m) || is_textured(m))
             return Error{"material \"" + m.name + "\", expected Lambert or Phong without textures", scene.file};
     for (const Mesh& m : scene.meshes)
         if (!m.normals.empty())

@@ -55,7 +55,7 @@ LidarUnit::LidarUnit(const World& world, std::size_t index, bool truth)
       truth_(truth ? shots_.size() : 0),
       bytes_(spec().data_packet_bytes),
       position_(spec().position_packet_bytes) {
-    receiver_.set_medium(world_.render_scene().medium());
+    receiver_.set_medium(world_.render_scene().lidar_medium());
     world_.place(0, lidar_.mount, placement_);
     model_.shots(0, shots_);
     if (fired_within(kSpan_ns, shots_) == shots_.size()) by_laser_ = order_by_laser(shots_);
@@ -131,7 +131,7 @@ void LidarUnit::trace_truth(std::int64_t start_ns) noexcept {
                                 .multipath = lidar_.receiver.multipath != LidarReceiverModel::Multipath::none,
                                 .motions = motions_,
                                 .mount = lidar_.mount,
-                                .medium = world_.render_scene().medium()};
+                                .medium = world_.render_scene().lidar_medium()};
     over_spans(start_ns, kVelocitySpan_ns, [&](const Span& span) {
         for (std::size_t first = span.first, end = first + span.n; first < end;) {
             RayBatch beams;

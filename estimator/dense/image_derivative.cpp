@@ -25,8 +25,7 @@ constexpr int kSquare = 8;
 constexpr double kPartsPerPixel = 1, kMaxParts = 8;
 
 bool depends_on_view(const Material& m) {
-    if (is_specular(m) || m.kind == Material::Kind::lambert) return false;
-    return m.kind != Material::Kind::phong || m.specular != Rgb{};
+    return !is_specular(m) && (!is_lambert_or_phong(m) || lobe_colour(m) != Rgb{});
 }
 
 /// The third term where a ray meets a surface: change of reflected sunlight with the direction to the camera, by

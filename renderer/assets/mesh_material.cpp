@@ -18,14 +18,14 @@ bool is_black(const Rgb& c) {
     return !(c.x > 0 || c.y > 0 || c.z > 0);
 }
 
-Material named(std::string name, Material::Kind kind, const Rgb& emission) {
+Material named(std::string name, const BsdfKind* kind, const Rgb& emission) {
     Material m{.name = std::move(name), .kind = kind};
     m.emission = clamped(emission, 1e30f);
     return m;
 }
 
 Material polished(std::string name, const Rgb& reflectance, const Rgb& emission) {
-    Material m = named(std::move(name), Material::Kind::mirror, emission);
+    Material m = named(std::move(name), &kinds::mirror, emission);
     m.specular = clamped(reflectance, 1);
     return m;
 }
@@ -71,7 +71,7 @@ MeshMaterial from_mtl(const MtlMaterial& given) {
 Material diffuse_and_lobe(std::string name, Rgb kd, Rgb ks, float exponent, const Rgb& emission) {
     kd = clamped(kd, 1), ks = clamped(ks, 1);
     const float most = std::max({1.0f, kd.x + ks.x, kd.y + ks.y, kd.z + ks.z});
-    Material m = named(std::move(name), is_black(ks) ? Material::Kind::lambert : Material::Kind::phong, emission);
+    Material m = named(std::move(name), is_black(ks) ? &kinds::lambert : &kinds::phong, emission);
     m.diffuse = kd / most;
     m.specular = ks / most;
     m.exponent = clamped(exponent, 1e4f);
@@ -80,7 +80,7 @@ Material diffuse_and_lobe(std::string name, Rgb kd, Rgb ks, float exponent, cons
 
 Material metallic_roughness(std::string name, const Rgb& base_colour, float metallic, float roughness, float ior,
                             const Rgb& emission) {
-    Material m = named(std::move(name), Material::Kind::ggx, emission);
+    Material m = named(std::move(name), &kinds::ggx, emission);
     m.diffuse = clamped(base_colour, 1);
     m.metallic = clamped(metallic, 1);
     m.roughness = clamped(roughness, 1);
@@ -89,7 +89,7 @@ Material metallic_roughness(std::string name, const Rgb& base_colour, float meta
 }
 
 Material smooth_glass(std::string name, float ior, const Rgb& emission) {
-    Material m = named(std::move(name), Material::Kind::dielectric, emission);
+    Material m = named(std::move(name), &kinds::dielectric, emission);
     m.ior = ior > 1 ? std::min(ior, 10.0f) : kOrdinaryIor;
     return m;
 }

@@ -157,7 +157,7 @@ private:
     void finish() {
         if (!given_) return;
         MeshMaterial m = from_mtl(*given_);
-        if (given_->transparent() && m.material.kind != Material::Kind::dielectric) ++transparent_;
+        if (given_->transparent() && m.material.kind != &kinds::dielectric) ++transparent_;
         materials_.insert_or_assign(given_->name, std::move(m));
         given_.reset();
     }

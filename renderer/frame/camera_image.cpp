@@ -19,11 +19,7 @@ namespace {
 
 /// Albedo output of a surface.
 Rgb base_colour(const Surface& s) {
-    switch (s.material->kind) {
-        case Material::Kind::mirror: return s.specular;
-        case Material::Kind::dielectric: return {1, 1, 1};
-        default: return s.diffuse;
-    }
+    return is_specular(*s.material) ? ambient_reflectance(s) : s.diffuse;
 }
 
 void resize(Aovs& a, std::size_t n) {

@@ -31,9 +31,7 @@ SecondVertex::SecondVertex(const Tracer& tracer, const PathVertex& a_vertex, con
 
 bool SecondVertex::is_reusable(const PathVertex& p) noexcept {
     // A surface with only a lobe reflects along its mirror direction, which differs for each receiver.
-    const Material::Kind kind = p.surface().material->kind;
-    return (kind == Material::Kind::lambert || kind == Material::Kind::phong) && !p.bent() &&
-           max_component(p.surface().diffuse) > 0;
+    return is_lambert_or_phong(*p.surface().material) && !p.bent() && max_component(p.surface().diffuse) > 0;
 }
 
 bool SecondVertex::leave(Path& p, const BsdfSample& s, float inverse_survival) noexcept {

@@ -43,7 +43,7 @@ public:
         // Vertex normals that face away from the viewer cannot be used.
         if (dot(surface_.normal, view_) <= 0) surface_.normal = hit.geometric_normal;
         bent_ = surface_.normal != plane_;
-        plain_ = !bent_ && surface_.material->kind == Material::Kind::lambert && dot(plane_, view_) > 0;
+        plain_ = !bent_ && surface_.material->kind == &kinds::lambert && dot(plane_, view_) > 0;
     }
 
     [[nodiscard]] const Surface& surface() const noexcept { return surface_; }
@@ -61,7 +61,7 @@ public:
     [[nodiscard]] bool specular() const noexcept { return is_specular(*surface_.material); }
     /// True for Lambert's law alone, about any normal.
     [[nodiscard]] bool has_no_lobe() const noexcept {
-        return surface_.material->kind <= Material::Kind::phong && surface_.specular == Rgb{};
+        return is_lambert_or_phong(*surface_.material) && surface_.specular == Rgb{};
     }
 
     struct Response {

@@ -160,7 +160,7 @@ void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, c
         const Rgb code = texture_lookup(*normals, hit.u, hit.v, seen, layout);
         const Rgb mean{about_middle(code.x), about_middle(code.y), about_middle(code.z)};
         n = mapped(n, frame, mean, m.normal_scale);
-        if (m.kind == Material::Kind::phong) s.exponent = widened(s.exponent, mean);
+        if (is_lambert_or_phong(m)) s.exponent = widened(s.exponent, mean);
     }
     s.normal = towards_viewer(side * n, -ray_direction, hit.geometric_normal);
 }

@@ -18,7 +18,7 @@ void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, c
 [[nodiscard]] inline Surface surface_at(const Tracer& tracer, const BodyPoses& at, const Hit& hit,
                                         const Vec3& ray_direction, double width_m) noexcept {
     const Material& m = tracer.scene().materials[static_cast<std::size_t>(hit.material)];
-    const bool no_lobe = m.kind == Material::Kind::lambert;
+    const bool no_lobe = m.kind == &kinds::lambert;
     Surface s{m.diffuse, no_lobe ? Rgb{} : m.specular, m.emission, m.exponent, &m, hit.shading_normal, hit.outside};
     if (is_textured(m)) apply_textures(tracer, at, hit, ray_direction, width_m, s);
     return s;

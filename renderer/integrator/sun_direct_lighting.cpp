@@ -5,6 +5,7 @@
 #include "base/each_isa.h"
 #include "renderer/integrator/integrator.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/material/phong_lobe.h"
 
 namespace narpa {
 namespace {
@@ -54,9 +55,9 @@ void gather_surfaces(const Frame& f, const CameraBatch& p, SurfaceLanes& surface
         const std::uint32_t same = lanes_with(p.hits.material, material) & left;
         left &= ~same;
         const Material& m = scene.materials[static_cast<std::size_t>(material)];
-        const Rgb specular = m.kind == Material::Kind::phong ? m.specular : Rgb{};
+        const Rgb specular = lobe_colour(m);
         if (!filled) fill(surfaces, m, specular), filled = true;
-        if (m.kind > Material::Kind::phong) {
+        if (!is_lambert_or_phong(m)) {
             surfaces.others |= same;
             continue;
         }
@@ -94,10 +95,7 @@ NARPA_EACH_ISA void emit(const SurfaceLanes& surfaces, const Rgb& ambient, RgbLa
 /// Phong's lobe about the mirror direction (bsdf.h), without its colour; 0 where the material has none.
 void lobes_of(const SurfaceLanes& surfaces, const Lanes<double>& r_v, Lanes<float>& lobe) noexcept {
     for (std::size_t i = 0; i < kLanes; ++i) {
-        const double power =
-            unit_power(std::min(std::max(r_v[i], 1e-300), 1.0), static_cast<double>(surfaces.exponent[i]));
-        const float scale = (surfaces.exponent[i] + 2) * 0.5f * static_cast<float>(std::numbers::inv_pi);
-        lobe[i] = r_v[i] > 0 ? scale * static_cast<float>(power) : 0;
+        lobe[i] = phong_lobe(r_v[i], surfaces.exponent[i]);
     }
 }
 

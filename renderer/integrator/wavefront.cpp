@@ -217,7 +217,7 @@ void Wavefront::scatter(int vertex, bool last) {
             const bool is_first = vertex == 0 && grouped_ && !vertices_[i].specular();
             if (is_first && !path.lit) {
                 const Surface& surface = vertices_[i].surface();
-                const bool plain = surface.material->kind <= Material::Kind::phong;
+                const bool plain = is_lambert_or_phong(*surface.material);
                 const float probability = first_survival(plain ? surface.diffuse + surface.specular : Rgb{1, 1, 1},
                                                          radiance_[path.ray] == Rgb{});
                 if (reuse_) path.first_vertex = first_.add(at_, hits_[i], vertices_[i], path, probability);

@@ -128,9 +128,9 @@ void DiffuseMultipath::trace(const BodyPoses& at, const RayBatch& rays, const Su
                           {seconds.position[i], lit.to_lidar[i], rays.time[i]}};
             double light = lit.light[i];
             if (settings.medium != nullptr)
-                light *= settings.medium->lidar_transmittance(at, way.there, returns[i].range_m) *
-                         settings.medium->lidar_transmittance(at, way.across, seconds.range_m[i]) *
-                         settings.medium->lidar_transmittance(at, way.home, lit.distance_m[i]);
+                light *= settings.medium->transmittance(at, way.there, returns[i].range_m) *
+                         settings.medium->transmittance(at, way.across, seconds.range_m[i]) *
+                         settings.medium->transmittance(at, way.home, lit.distance_m[i]);
             LidarReturn& r = late_[sub_rays.place[i] * rays_each_ + n];
             r.range_m = range_m;
             r.reflectivity = static_cast<float>(light * range_m * range_m);

@@ -120,7 +120,7 @@ std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams,
 float LidarReceiver::sunlight_in_air(const BodyPoses& at, const Ray& beam, double axis_m, double u) const noexcept {
     const double range_m = axis_m > 0 ? axis_m : kInfinity;
     return static_cast<float>(std::numbers::pi / tracer_.scene().sun->irradiance_w_m2 *
-                              medium_->lidar_in_scattering(at, beam, range_m, u));
+                              medium_->in_scattering(at, beam, range_m, u));
 }
 
 /// Noise of the receiver relative to that in the dark.

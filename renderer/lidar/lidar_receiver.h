@@ -40,7 +40,7 @@ public:
 
     /// The medium dims the returns, scatters light of the pulses back, and scatters sunlight into the beams; null,
     /// the default: a vacuum. It must outlive this.
-    void set_medium(const Medium* medium) noexcept {
+    void set_medium(const LidarMedium* medium) noexcept {
         medium_ = medium;
         bright_air_ = medium != nullptr && sunlight_ && tracer_.scene().sun.has_value();
         air_ = AirEcho(model_, min_light_, medium);
@@ -95,7 +95,7 @@ private:
     PhiloxSchedule schedule_;
     std::uint32_t stream_;
     BeamCone cone_;
-    const Medium* medium_ = nullptr;
+    const LidarMedium* medium_ = nullptr;
     AirEcho air_;
     BeamCulling culling_;
     Lanes<std::size_t> first_{};    ///< sub-ray in `met_` of each shot that may meet a body

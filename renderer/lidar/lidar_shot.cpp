@@ -10,6 +10,7 @@
 #include "renderer/geometry/poses_at.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/lidar/plain_returns.h"
+#include "renderer/material/bsdf_kind.h"
 #include "renderer/material/texture_lookup.h"
 
 namespace narpa {
@@ -32,7 +33,7 @@ struct Path {
 };
 
 float sunlight_on(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Surface& surface,
-                  const Vec3& back, const Medium* medium) {
+                  const Vec3& back, const LidarMedium* medium) {
     const auto& sun = tracer.scene().sun;
     if (!sun) return 0;
     const double cosine = dot(surface.normal, sun->direction);
@@ -40,8 +41,8 @@ float sunlight_on(const Tracer& tracer, const BodyPoses& at, const Hit& hit, con
     const auto light =
         static_cast<float>(std::numbers::pi * cosine * mean(bsdf(surface, surface.normal, sun->direction, back)));
     if (medium == nullptr) return light;
-    return light * static_cast<float>(medium->lidar_transmittance(at, {hit.position, sun->direction, hit.time},
-                                                                  std::numeric_limits<double>::infinity()));
+    return light * static_cast<float>(medium->transmittance(at, {hit.position, sun->direction, hit.time},
+                                                            std::numeric_limits<double>::infinity()));
 }
 
 /// Same as surface_at, for a lane. Most surfaces have at most a colour texture; for these the rest of the hit is
@@ -110,9 +111,9 @@ void put_return(const Tracer& tracer, const BodyPoses& at, const HitBatch& hits,
 
 /// Attenuates the path by the medium on the segment that ends at the hit, both ways.
 void dim(Path& path, const BodyPoses& at, const Vec3& from, const HitBatch& hits, std::size_t i,
-         const Medium& medium) {
+         const LidarMedium& medium) {
     const double passes =
-        medium.lidar_transmittance(at, {from, path.direction, hits.time[i]}, norm(hits.position[i] - from));
+        medium.transmittance(at, {from, path.direction, hits.time[i]}, norm(hits.position[i] - from));
     path.throughput *= passes * passes;
     path.one_way *= passes;
 }
@@ -150,7 +151,7 @@ Path to_first_hit(const BodyPoses& at, const RayBatch& beams, const HitBatch& hi
 
 bool goes_on(const Tracer& tracer, const HitBatch& hits, std::size_t i, const ShotSettings& settings) {
     const Material& m = tracer.scene().materials[static_cast<std::size_t>(hits.material[i])];
-    return settings.multipath && m.kind == Material::Kind::mirror;
+    return settings.multipath && m.kind->is_mirror;
 }
 
 void reflect(Path& path, const Tracer& tracer, const HitBatch& hits, std::size_t i) {

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "renderer/geometry/tracer.h"
-#include "renderer/light/medium.h"
+#include "renderer/light/lidar_medium.h"
 
 namespace narpa {
 
@@ -28,7 +28,7 @@ struct ShotSettings {
     std::span<const Motion> motions{};
     int mount = -1;                           ///< body that the LiDAR rides on; -1: it is at rest
     std::span<const std::uint32_t> bodies{};  ///< all that the shots may meet before a mirror; empty: any may be
-    const Medium* medium = nullptr;           ///< dims the light on its way there and back; null: a vacuum
+    const LidarMedium* medium = nullptr;      ///< dims the light on its way there and back; null: a vacuum
 };
 
 /// Velocity of a material point of a body by settings.motions, world; 0 for body -1.

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "base/each_isa.h"
-#include "base/fast_math.h"
 #include "renderer/material/bsdf.h"
+#include "renderer/material/phong_lobe.h"
 #include "renderer/material/texture_lookup.h"
 
 namespace narpa {
@@ -48,8 +48,8 @@ void gather_plain(const Tracer& tracer, const HitBatch& hits, std::uint32_t met,
         const std::uint32_t same = lanes_with(hits.material, material) & left;
         left &= ~same;
         const Material& m = tracer.scene().materials[static_cast<std::size_t>(material)];
-        if (m.kind > Material::Kind::phong || has_more_than_colour(m)) continue;
-        const Rgb specular = m.kind == Material::Kind::lambert ? Rgb{} : m.specular;
+        if (!is_lambert_or_phong(m) || has_more_than_colour(m)) continue;
+        const Rgb specular = lobe_colour(m);
         out.lanes |= same;
         out.shiny |= specular != Rgb{};
         if (same == met)
@@ -72,12 +72,7 @@ NARPA_EACH_ISA void evaluate_backscatter(const PlainSurfaces& surfaces, const Ve
         r_v[i] = 2 * cosine[i] * cosine[i] - dot(back, back);
     }
     if (surfaces.shiny)
-        for (std::size_t i = 0; i < kLanes; ++i) {
-            const double power =
-                unit_power(std::min(std::max(r_v[i], 1e-300), 1.0), static_cast<double>(surfaces.exponent[i]));
-            const float scale = (surfaces.exponent[i] + 2) * 0.5f * inv_pi;
-            lobe[i] = r_v[i] > 0 ? scale * static_cast<float>(power) : 0;
-        }
+        for (std::size_t i = 0; i < kLanes; ++i) lobe[i] = phong_lobe(r_v[i], surfaces.exponent[i]);
     for (std::size_t i = 0; i < kLanes; ++i) {
         const float r = surfaces.diffuse.r[i] * inv_pi + surfaces.specular.r[i] * lobe[i];
         const float g = surfaces.diffuse.g[i] * inv_pi + surfaces.specular.g[i] * lobe[i];

@@ -1,15 +1,13 @@
 #include "renderer/light/atmosphere.h"
 
-#include <algorithm>
+#include <cassert>
 #include <cmath>
 
-#include "renderer/scene/lidar_sunlight.h"
+#include "renderer/light/air_for_lidar.h"
 
 namespace narpa {
 namespace {
 
-/// Wavelength of the LiDARs' beams.
-constexpr double kLidar_m = 905e-9;
 /// Rays whose origins are this close (as on a lens) are treated as having one origin. Origins are rounded to
 /// kPlace_m and Sun directions to kSunDirection, so that they share cells (AirCache).
 constexpr double kOnePlace_m = 1, kPlace_m = 0.25, kSunDirection = 0x1p-20;
@@ -24,43 +22,27 @@ AirResolution resolution_of(const Atmosphere& a) {
     return r;
 }
 
-/// An error of 1 % suffices: the light only adds shot noise, which goes with its square root.
-AirResolution lidar_resolution_of(const Atmosphere& a) {
-    AirResolution r;
-    r.steps = std::min(a.steps, 8);
-    r.heights = 12;
-    return r;
-}
-
-double radius_of(const Scene& scene) {
-    return scene.sun ? 0.5 * scene.sun->angular_diameter_rad : 0;
+std::optional<Vec3> to_sun(const std::optional<Sun>& sun, const Planet::Frame& frame) noexcept {
+    if (!sun) return std::nullopt;
+    return normalized(frame.direction(sun->direction));
 }
 
 }  // namespace
 
-AtmosphereMedium::AtmosphereMedium(const Scene& scene, int threads)
-    : body_(static_cast<std::size_t>(scene.atmosphere->body)),
-      sun_(scene.sun),
-      light_(Air(scene.atmosphere->air, scene.atmosphere->samples_per_band), resolution_of(*scene.atmosphere),
-             radius_of(scene), threads),
-      lidar_air_(scene.atmosphere->air, kLidar_m, scene.atmosphere->steps) {
-    if (std::ranges::any_of(scene.lidars, sees_sunlight))
-        lidar_light_.emplace(Air(scene.atmosphere->air, kLidar_m), lidar_resolution_of(*scene.atmosphere),
-                             radius_of(scene), threads);
-    if (const auto* const e = std::get_if<Ellipsoid>(&scene.bodies[body_].shape)) {
+Planet::Planet(const Scene& scene) : body(static_cast<std::size_t>(scene.atmosphere->body)) {
+    assert(body < scene.bodies.size());
+    if (const auto* const e = std::get_if<Ellipsoid>(&scene.bodies[body].shape)) {
         const double radius = scene.atmosphere->air.ground_radius_m;
-        scale_ = {radius / e->semi_axes_m.x, radius / e->semi_axes_m.y, radius / e->semi_axes_m.z};
+        scale = {radius / e->semi_axes_m.x, radius / e->semi_axes_m.y, radius / e->semi_axes_m.z};
     }
 }
 
-AtmosphereMedium::Frame AtmosphereMedium::frame_at(const BodyPoses& at, double time) const noexcept {
-    return {at.T_world_body_at(body_, time), scale_};
-}
-
-std::optional<Vec3> AtmosphereMedium::to_sun(const Frame& frame) const noexcept {
-    if (!sun_) return std::nullopt;
-    return normalized(frame.direction(sun_->direction));
-}
+AtmosphereMedium::AtmosphereMedium(const Scene& scene, int threads)
+    : planet_(scene),
+      sun_(scene.sun),
+      light_(Air(scene.atmosphere->air, scene.atmosphere->samples_per_band), resolution_of(*scene.atmosphere),
+             scene.sun ? 0.5 * scene.sun->angular_diameter_rad : 0, threads),
+      lidar_(std::make_shared<const AirForLidar>(scene, threads)) {}
 
 MediumSegment AtmosphereMedium::segment(const AirLight& light) const noexcept {
     if (!sun_) return {light.transmittance, {}};
@@ -68,10 +50,10 @@ MediumSegment AtmosphereMedium::segment(const AirLight& light) const noexcept {
 }
 
 MediumSegment AtmosphereMedium::along(const BodyPoses& at, const Ray& ray, double range_m, double) const noexcept {
-    const Frame frame = frame_at(at, ray.time);
+    const Planet::Frame frame = planet_.at(at, ray.time);
     const Vec3 toward = frame.direction(ray.direction);
     const double metre = norm(toward);
-    const std::optional<Vec3> sun = to_sun(frame);
+    const std::optional<Vec3> sun = to_sun(sun_, frame);
     return segment(
         air_along(light_, frame.point(ray.origin), toward / metre, range_m * metre, sun ? &*sun : nullptr));
 }
@@ -81,15 +63,15 @@ void AtmosphereMedium::along_each(const BodyPoses& at, std::span<const MediumRay
     if (rays.empty()) return;
     if (rays.size() > RayBundle::kMax) return Medium::along_each(at, rays, segments);
     double time = rays.front().ray.time;
-    Frame frame = frame_at(at, time);
+    Planet::Frame frame = planet_.at(at, time);
     const Vec3 origin = rounded(frame.point(rays.front().ray.origin), kPlace_m);
-    std::optional<Vec3> sun = to_sun(frame);
+    std::optional<Vec3> sun = to_sun(sun_, frame);
     if (sun) sun = normalized(rounded(*sun, kSunDirection));
     UninitializedArray<RayBundle::Ray, RayBundle::kMax> bundle;
     UninitializedArray<AirLight, RayBundle::kMax> light;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         const auto& [ray, range_m, u] = rays[i];
-        if (ray.time != time) frame = frame_at(at, time = ray.time);
+        if (ray.time != time) frame = planet_.at(at, time = ray.time);
         if (norm(frame.point(ray.origin) - origin) > kOnePlace_m) return Medium::along_each(at, rays, segments);
         const Vec3 toward = frame.direction(ray.direction);
         const double metre = norm(toward);
@@ -101,7 +83,7 @@ void AtmosphereMedium::along_each(const BodyPoses& at, std::span<const MediumRay
 }
 
 Rgb AtmosphereMedium::transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept {
-    const Frame frame = frame_at(at, ray.time);
+    const Planet::Frame frame = planet_.at(at, ray.time);
     const Vec3 toward = frame.direction(ray.direction);
     const double metre = norm(toward);
     return transmittance_of(light_.air(), light_.columns(frame.point(ray.origin), toward / metre, range_m * metre));
@@ -110,38 +92,11 @@ Rgb AtmosphereMedium::transmittance(const BodyPoses& at, const Ray& ray, double 
 Rgb AtmosphereMedium::ambient(const BodyPoses& at, const Vec3& position, const Vec3& normal,
                               double time) const noexcept {
     if (!sun_) return {};
-    const Frame frame = frame_at(at, time);
+    const Planet::Frame frame = planet_.at(at, time);
     const Vec3 up = conjugate(frame.T_world_planet.q) * normal;
     const Vec3 to_sun = normalized(frame.direction(sun_->direction));
     const auto light = light_.skylight(frame.point(position), up, to_sun);
     return static_cast<float>(sun_->irradiance_w_m2 / 3.14159265358979323846) * bands_of(light_.air(), light);
-}
-
-double AtmosphereMedium::lidar_transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept {
-    const Frame frame = frame_at(at, ray.time);
-    const Vec3 toward = frame.direction(ray.direction);
-    const double metre = norm(toward);
-    return lidar_air_.transmittance(frame.point(ray.origin), toward / metre, range_m * metre);
-}
-
-double AtmosphereMedium::lidar_in_scattering(const BodyPoses& at, const Ray& ray, double range_m,
-                                             double) const noexcept {
-    if (!lidar_light_ || !sun_) return 0;
-    const Frame frame = frame_at(at, ray.time);
-    const Vec3 toward = frame.direction(ray.direction);
-    const double metre = norm(toward);
-    const Vec3 sun = *to_sun(frame);
-    const AirLight light = air_along(*lidar_light_, frame.point(ray.origin), toward / metre, range_m * metre, &sun);
-    return sun_->irradiance_w_m2 * static_cast<double>(light.in_scattering.x);
-}
-
-/// Lengths are not rescaled: the ellipsoid's scale changes them by 0.3 %.
-Medium::Backscatter AtmosphereMedium::lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
-                                                        double to_m) const noexcept {
-    const Frame frame = frame_at(at, ray.time);
-    const auto [light, range_m] =
-        lidar_air_.backscattered(frame.point(ray.origin), normalized(frame.direction(ray.direction)), from_m, to_m);
-    return {light, range_m};
 }
 
 }  // namespace narpa

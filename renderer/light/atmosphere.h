@@ -10,12 +10,34 @@
 #include <memory>
 #include <optional>
 
-#include "renderer/atmosphere/lidar_air.h"
 #include "renderer/atmosphere/ray_bundle.h"
 #include "renderer/light/medium.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
+
+/// Transforms between the world and the sphere of a planet's air.
+struct Planet {
+    std::size_t body = 0;
+    Vec3 scale{1, 1, 1};
+
+    explicit Planet(const Scene& scene);
+
+    struct Frame {
+        Rigid3 T_world_planet;
+        Vec3 scale;
+        [[nodiscard]] Vec3 point(const Vec3& world) const {
+            return scale * (conjugate(T_world_planet.q) * (world - T_world_planet.t));
+        }
+        /// Not unit: its length is the scaled length of one metre.
+        [[nodiscard]] Vec3 direction(const Vec3& world) const {
+            return scale * (conjugate(T_world_planet.q) * world);
+        }
+    };
+    [[nodiscard]] Frame at(const BodyPoses& poses, double time) const noexcept {
+        return {poses.T_world_body_at(body, time), scale};
+    }
+};
 
 class AtmosphereMedium final : public Medium {
 public:
@@ -31,40 +53,17 @@ public:
     [[nodiscard]] Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept override;
     [[nodiscard]] Rgb ambient(const BodyPoses& at, const Vec3& position, const Vec3& normal,
                               double time) const noexcept override;
-    [[nodiscard]] double lidar_transmittance(const BodyPoses& at, const Ray& ray,
-                                             double range_m) const noexcept override;
-    /// 0 unless a LiDAR of the scene sees sunlight.
-    [[nodiscard]] double lidar_in_scattering(const BodyPoses& at, const Ray& ray, double range_m,
-                                             double u) const noexcept override;
-    [[nodiscard]] Backscatter lidar_backscatter(const BodyPoses& at, const Ray& ray, double from_m,
-                                                double to_m) const noexcept override;
-    [[nodiscard]] double max_lidar_backscatter_1_m() const noexcept override { return lidar_air_.max_1_m(); }
-    [[nodiscard]] int body() const noexcept override { return static_cast<int>(body_); }
+    [[nodiscard]] std::shared_ptr<const LidarMedium> for_lidar() const override { return lidar_; }
+    [[nodiscard]] int body() const noexcept override { return static_cast<int>(planet_.body); }
 
 private:
-    /// Transforms world coordinates to the planet's sphere.
-    struct Frame {
-        Rigid3 T_world_planet;
-        Vec3 scale;
-        [[nodiscard]] Vec3 point(const Vec3& world) const {
-            return scale * (conjugate(T_world_planet.q) * (world - T_world_planet.t));
-        }
-        /// Not unit: its length is the scaled length of one metre.
-        [[nodiscard]] Vec3 direction(const Vec3& world) const {
-            return scale * (conjugate(T_world_planet.q) * world);
-        }
-    };
-    [[nodiscard]] Frame frame_at(const BodyPoses& at, double time) const noexcept;
-    [[nodiscard]] std::optional<Vec3> to_sun(const Frame& frame) const noexcept;
     [[nodiscard]] MediumSegment segment(const AirLight& light) const noexcept;
 
-    std::size_t body_;
-    Vec3 scale_{1, 1, 1};
+    Planet planet_;
     std::optional<Sun> sun_;
     ScatteredLight light_;
     std::unique_ptr<AirCache> cells_ = std::make_unique<AirCache>();  ///< cache shared by frames
-    LidarAir lidar_air_;
-    std::optional<ScatteredLight> lidar_light_;  ///< at the wavelength of LiDARs
+    std::shared_ptr<const LidarMedium> lidar_;
 };
 
 }  // namespace narpa

@@ -5,10 +5,12 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 
 #include "base/vec3.h"
 #include "renderer/geometry/tracer.h"
+#include "renderer/light/lidar_medium.h"
 
 namespace narpa {
 
@@ -50,28 +52,9 @@ public:
                                       double /*time*/) const noexcept {
         return {};
     }
-    /// One-way transmittance of a LiDAR's beam.
-    [[nodiscard]] virtual double lidar_transmittance(const BodyPoses& at, const Ray& ray,
-                                                     double range_m) const noexcept {
-        return static_cast<double>(mean_band(transmittance(at, ray, range_m)));
-    }
-    /// As `along`: radiance of scattered sunlight at the wavelength of LiDARs, W m^-2 sr^-1.
-    [[nodiscard]] virtual double lidar_in_scattering(const BodyPoses& at, const Ray& ray, double range_m,
-                                                     double u) const noexcept {
-        return static_cast<double>(mean_band(along(at, ray, range_m, u).in_scattering));
-    }
-    /// Return of a LiDAR's pulse from the medium between two ranges, 0 < from_m < to_m: pi times the integral of
-    /// backscatter * transmittance^2 / range^2, in units in which a diffuse surface returns reflectivity *
-    /// transmittance^2 / range^2; and its mean range.
-    struct Backscatter {
-        double light = 0, range_m = 0;
-    };
-    [[nodiscard]] virtual Backscatter lidar_backscatter(const BodyPoses& /*at*/, const Ray& /*ray*/,
-                                                        double /*from_m*/, double /*to_m*/) const noexcept {
-        return {};
-    }
-    /// Pi times the largest backscatter coefficient anywhere, 1/m; 0: no backscatter.
-    [[nodiscard]] virtual double max_lidar_backscatter_1_m() const noexcept { return 0; }
+    /// The same medium at the wavelength of LiDARs. It lives no longer than this one. By default a medium with the
+    /// mean band's values that scatters no pulse back.
+    [[nodiscard]] virtual std::shared_ptr<const LidarMedium> for_lidar() const;
     /// The body that the medium moves with; -1: it is at rest.
     [[nodiscard]] virtual int body() const noexcept { return -1; }
 };

@@ -32,18 +32,22 @@ public:
     [[nodiscard]] const Background& background() const noexcept { return *background_; }
     /// Null: a vacuum.
     [[nodiscard]] const Medium* medium() const noexcept { return medium_.get(); }
+    /// The medium at the wavelength of LiDARs; null: a vacuum.
+    [[nodiscard]] const LidarMedium* lidar_medium() const noexcept { return lidar_medium_.get(); }
 
 private:
     RenderScene(Tracer tracer, std::unique_ptr<const Background> background, std::unique_ptr<const Medium> medium)
         : tracer_(std::move(tracer)),
           lights_(tracer_),
           background_(std::move(background)),
-          medium_(std::move(medium)) {}
+          medium_(std::move(medium)),
+          lidar_medium_(medium_ ? medium_->for_lidar() : nullptr) {}
 
     Tracer tracer_;
     Lights lights_;
     std::unique_ptr<const Background> background_;
     std::unique_ptr<const Medium> medium_;
+    std::shared_ptr<const LidarMedium> lidar_medium_;
 };
 
 }  // namespace narpa

@@ -1,11 +1,10 @@
 #include "renderer/material/albedo.h"
 
 #include <algorithm>
-#include <limits>
 #include <numbers>
 
+#include "renderer/material/bsdf_kind.h"
 #include "renderer/material/directions.h"
-#include "renderer/material/regolith.h"
 
 namespace narpa {
 
@@ -24,22 +23,7 @@ Rgb directional_albedo(const Surface& s, double mu, int steps) noexcept {
 }
 
 Rgb largest_albedo(const Material& m) noexcept {
-    using Kind = Material::Kind;
-    constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    switch (m.kind) {
-        case Kind::lambert: return m.diffuse;
-        case Kind::phong: return m.diffuse + m.specular;
-        case Kind::phong_classic: return {kInfinity, kInfinity, kInfinity};
-        case Kind::mirror: return m.specular;
-        case Kind::dielectric: return {1, 1, 1};
-        case Kind::ggx: {
-            const auto bound = [](float base) { return std::max(base, 1.0f); };
-            return {bound(m.diffuse.x), bound(m.diffuse.y), bound(m.diffuse.z)};
-        }
-        case Kind::lunar_lambert: return m.diffuse * static_cast<float>(kLunarLambertLargest);
-        case Kind::lommel_seeliger:
-        case Kind::hapke: break;
-    }
+    if (m.kind->largest_albedo != nullptr) return m.kind->largest_albedo(m);
     Surface s;
     s.diffuse = m.diffuse;
     s.material = &m;

@@ -13,11 +13,12 @@
 /// ggx              facets (over diffuse), every bounce        visible normals       for base <= 1, ior in 1..3
 /// lommel_seeliger  w p(a) / (4 pi (n.l + n.v))                p                     for w <= 1
 /// lunar_lambert    A (2 L(a) / (n.l + n.v) + 1 - L(a)) / pi   even, cosine          for A <= 0.586
+/// akimov           A D(a, beta, gamma) / (pi n.l)             even                  for A <= 0.589
 /// hapke            Hapke 2012                                 p, cosine             for soils; see albedo.h
 ///
 /// Sources: E. Lafortune, Y. Willems, "Using the Modified Phong Reflectance Model", 1994 (phong); the paper,
 /// section III (phong_classic: I_S = I_D = E / pi, so that kd is an albedo); fresnel.h; ggx.cpp; regolith.h;
-/// hapke.cpp. What albedo any of them reaches: `largest_albedo` in albedo.h.
+/// akimov.cpp; hapke.cpp. What albedo any of them reaches: `largest_albedo` in albedo.h.
 #pragma once
 
 #include <array>
@@ -27,7 +28,7 @@
 namespace narpa {
 
 /// Default material of a Surface: Phong with the Surface's own values (Lambert while specular is 0).
-inline const Material kPlainMaterial{.name = {}, .kind = Material::Kind::phong};
+inline const Material kPlainMaterial{.name = {}, .kind = &kinds::phong};
 
 /// A material at one point, its textures looked up.
 struct Surface {
@@ -43,6 +44,10 @@ struct Surface {
 /// True if the BSDF is a delta distribution (mirror, dielectric). Then f is 0 everywhere and only `sample_bsdf`
 /// finds light.
 [[nodiscard]] bool is_specular(const Material& m) noexcept;
+/// True if f is kd / pi, or that and Phong's lobe of ks: BsdfKind::lambert_or_phong.
+[[nodiscard]] bool is_lambert_or_phong(const Material& m) noexcept;
+/// ks of a lobe; 0 for kinds without one.
+[[nodiscard]] Rgb lobe_colour(const Material& m) noexcept;
 
 /// Reflected radiance per irradiance, 1/sr; 0 unless l and v both lie on the side of n, and 0 for specular kinds.
 [[nodiscard]] Rgb bsdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept;
@@ -66,14 +71,9 @@ struct BsdfSample {
 [[nodiscard]] BsdfSample sample_bsdf(const Surface& s, const Vec3& n, const Vec3& v,
                                      const std::array<double, 3>& u) noexcept;
 
-/// `ambient_reflectance` for the kinds after phong.
-[[nodiscard]] Rgb other_ambient_reflectance(const Surface& s) noexcept;
-
 /// Reflected radiance under a uniform environment of radiance 1, averaged over the viewer's directions: the factor
 /// of `[ambient]` in direct light. Phong's lobe counts as at normal incidence, where its albedo is exactly ks;
 /// phong_classic uses its ka.
-[[nodiscard]] inline Rgb ambient_reflectance(const Surface& s) noexcept {
-    return s.material->kind <= Material::Kind::phong ? s.diffuse + s.specular : other_ambient_reflectance(s);
-}
+[[nodiscard]] Rgb ambient_reflectance(const Surface& s) noexcept;
 
 }  // namespace narpa

@@ -8,19 +8,32 @@
 // V + M: Kulla and Conty 2017. All of it is reciprocal, and reflects no more than it gets.
 #include <cmath>
 
+#include "base/constants.h"
+#include "renderer/keys/toml_reader.h"
 #include "renderer/material/directions.h"
 #include "renderer/material/fresnel.h"
 #include "renderer/material/ggx_albedo.h"
-#include "renderer/material/lobes.h"
+#include "renderer/material/material_keys.h"
 
-namespace narpa::lobes {
+namespace narpa {
 namespace {
+
+constexpr std::string_view kGgxKeys[] = {"albedo", "texture", "metallic", "roughness", "ior", "fresnel"};
+
+void ggx_read(TableReader& table, Material& m) {
+    read_albedo(table, m);
+    m.metallic = static_cast<float>(table.number("metallic", kUnit).value_or(m.metallic));
+    m.roughness = static_cast<float>(table.number("roughness", kUnit).value_or(m.roughness));
+    read_fresnel(table, m, 1, 3);
+}
 
 /// Smoother surfaces are treated as this one: a lobe of 20 arcsec, the limit that double and a mesh's float normals
 /// resolve.
 constexpr double kMinRoughness = 0.01;
 /// Multiple scattering below this mean is ignored: it would only give rare bright samples.
 constexpr double kMinMultiple = 1e-3;
+/// Lower densities occur only by rounding, and could overflow the weight.
+constexpr double kGgxMinDensity = 1e-30;
 
 /// Quantities that depend on neither l nor v.
 struct Ggx {
@@ -88,14 +101,14 @@ struct SeenGgx : Ggx {
         double first = 0, later = 0;
         if (metallic > 0) {
             metal_later = multiple_metal();
-            first += metallic * mean(schlick(base, n_v)) * albedo.at(n_v);
-            later += metallic * unseen_v * mean(metal_later);
+            first += metallic * band_mean(schlick(base, n_v)) * albedo.at(n_v);
+            later += metallic * unseen_v * band_mean(metal_later);
         }
         if (metallic < 1) {
             const double above = albedo.dielectric(coat, n_v);
             through_v = std::max(0.0, 1 - above - unseen_v * multiple_diel);
             first += (1 - metallic) * above;
-            later += (1 - metallic) * (unseen_v * multiple_diel + mean(base) * through_v);
+            later += (1 - metallic) * (unseen_v * multiple_diel + band_mean(base) * through_v);
         }
         share = later > 0 ? std::clamp(first / (first + later), 0.1, 0.9) : 1;
     }
@@ -144,28 +157,26 @@ struct SeenGgx : Ggx {
     }
 };
 
-}  // namespace
-
-Rgb ggx_f(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept {
-    return SeenGgx(s, n, v).f(l);
+Rgb ggx_f(const Surface& s, const BsdfGeometry& g) noexcept {
+    return SeenGgx(s, g.n, g.v).f(g.l);
 }
 
-double ggx_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept {
-    return SeenGgx(s, n, v).pdf(l);
+double ggx_pdf(const Surface& s, const BsdfGeometry& g) noexcept {
+    return SeenGgx(s, g.n, g.v).pdf(g.l);
 }
 
 BsdfSample ggx_sample(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
     const SeenGgx g(s, n, v);
-    BsdfSample sample;
-    sample.l = g.direction(u);
-    const double n_l = dot(n, sample.l);
-    if (n_l <= 0) return sample;
-    sample.pdf = g.pdf(sample.l);
-    if (sample.pdf > kMinDensity) sample.weight = g.f(sample.l) * static_cast<float>(n_l / sample.pdf);
-    return sample;
+    BsdfSample out;
+    out.l = g.direction(u);
+    const double n_l = dot(n, out.l);
+    if (n_l <= 0) return out;
+    out.pdf = g.pdf(out.l);
+    if (out.pdf > kGgxMinDensity) out.weight = g.f(out.l) * static_cast<float>(n_l / out.pdf);
+    return out;
 }
 
-Rgb ggx_mean_albedo(const Surface& s) noexcept {
+Rgb ggx_ambient(const Surface& s) noexcept {
     const Ggx g(s);
     const float mean = static_cast<float>(g.albedo.mean()),
                 power = static_cast<float>(g.albedo.mean_schlick_power());
@@ -176,4 +187,20 @@ Rgb ggx_mean_albedo(const Surface& s) noexcept {
     return metal * static_cast<float>(g.metallic) + dielectric * static_cast<float>(1 - g.metallic);
 }
 
-}  // namespace narpa::lobes
+/// A bound: white metal reflects all.
+Rgb ggx_largest_albedo(const Material& m) noexcept {
+    return {std::max(m.diffuse.x, 1.0f), std::max(m.diffuse.y, 1.0f), std::max(m.diffuse.z, 1.0f)};
+}
+
+}  // namespace
+
+constinit const BsdfKind kinds::ggx{.name = "ggx",
+                                    .keys = kGgxKeys,
+                                    .read = ggx_read,
+                                    .f = ggx_f,
+                                    .pdf = ggx_pdf,
+                                    .sample = ggx_sample,
+                                    .ambient = ggx_ambient,
+                                    .largest_albedo = ggx_largest_albedo};
+
+}  // namespace narpa

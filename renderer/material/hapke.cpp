@@ -5,12 +5,30 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/constants.h"
+#include "renderer/keys/toml_reader.h"
 #include "renderer/material/directions.h"
-#include "renderer/material/lobes.h"
+#include "renderer/material/material_keys.h"
 #include "renderer/material/regolith.h"
 
-namespace narpa::lobes {
+namespace narpa {
 namespace {
+
+constexpr std::string_view kHapkeKeys[] = {"albedo",       "texture",      "b", "c", "opposition_b0",
+                                           "opposition_h", "roughness_deg"};
+
+void hapke_read(TableReader& table, Material& m) {
+    const auto number = [&table](const char* key, const Range& range, float& value) {
+        value = static_cast<float>(table.number(key, range).value_or(value));
+    };
+    read_albedo(table, m);
+    number("b", {.low = 0, .high = 0.95}, m.hapke.phase_b);
+    number("c", {.low = -1, .high = 1}, m.hapke.phase_c);
+    number("opposition_b0", {.low = 0, .high = 10}, m.hapke.opposition_b0);
+    number("opposition_h", {.low = 0, .high = 10, .low_open = true}, m.hapke.opposition_h);
+    if (const auto degrees = table.number("roughness_deg", {.low = 0, .high = 60}))
+        m.hapke.roughness_rad = static_cast<float>(*degrees * kPi / 180);
+}
 
 double double_henyey_greenstein(const Hapke& h, double cos_phase) {
     const double b = static_cast<double>(h.phase_b), c = static_cast<double>(h.phase_c);
@@ -72,18 +90,17 @@ RoughGeometry rough_geometry(double roughness_rad, double n_l, double n_v, doubl
 
 /// Share of cosine-distributed samples: about that of multiply scattered light.
 double multiple_share(const Surface& s) {
-    return 0.15 + 0.6 * std::clamp(mean(s.diffuse), 0.0, 1.0);
+    return 0.15 + 0.6 * std::clamp(band_mean(s.diffuse), 0.0, 1.0);
 }
 
-}  // namespace
-
-Rgb hapke_f(const Surface& s, double n_l, double n_v, double l_v) noexcept {
+Rgb hapke_f(const Surface& s, const BsdfGeometry& cosines) noexcept {
     const Hapke& h = s.material->hapke;
-    const RoughGeometry g = rough_geometry(static_cast<double>(h.roughness_rad), n_l, n_v, l_v);
+    const RoughGeometry g =
+        rough_geometry(static_cast<double>(h.roughness_rad), cosines.n_l, cosines.n_v, cosines.l_v);
     const double both = g.mu_l + g.mu_v;
     if (!(both > 0)) return {};
     const double geometry = g.mu_l / both * g.shadowing / (4 * kPi);
-    const double single = (1 + opposition(h, l_v)) * double_henyey_greenstein(h, l_v) - 1;
+    const double single = (1 + opposition(h, cosines.l_v)) * double_henyey_greenstein(h, cosines.l_v) - 1;
     const auto band = [&](float albedo) {
         const double w = static_cast<double>(albedo);
         return static_cast<float>(w * geometry *
@@ -94,11 +111,11 @@ Rgb hapke_f(const Surface& s, double n_l, double n_v, double l_v) noexcept {
     return {x, y, w.z == w.x ? x : w.z == w.y ? y : band(w.z)};
 }
 
-double hapke_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept {
+double hapke_pdf(const Surface& s, const BsdfGeometry& g) noexcept {
     const Hapke& h = s.material->hapke;
-    const double l_v = dot(l, v), mirrored = l_v - 2 * dot(n, l) * dot(n, v), share = multiple_share(s);
-    const double single = (double_henyey_greenstein(h, l_v) + double_henyey_greenstein(h, mirrored)) / (4 * kPi);
-    return (1 - share) * single + share * dot(n, l) / kPi;
+    const double mirrored = g.l_v - 2 * g.n_l * g.n_v, share = multiple_share(s);
+    const double single = (double_henyey_greenstein(h, g.l_v) + double_henyey_greenstein(h, mirrored)) / (4 * kPi);
+    return (1 - share) * single + share * g.n_l / kPi;
 }
 
 Vec3 hapke_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
@@ -113,7 +130,7 @@ Vec3 hapke_direction(const Surface& s, const Vec3& n, const Vec3& v, const Rando
 // Single scattering: that of a Lommel-Seeliger sphere. Multiple scattering: that of isotropic scatterers (Hapke
 // 2012, chapter 11, within 0.3 per cent). The narrow opposition peak and shadowing by roughness are left out: an
 // upper bound except for that peak.
-Rgb hapke_mean_albedo(const Surface& s) noexcept {
+Rgb hapke_ambient(const Surface& s) noexcept {
     const Hapke& h = s.material->hapke;
     const double b = static_cast<double>(h.phase_b), c = static_cast<double>(h.phase_c);
     const double single =
@@ -126,4 +143,15 @@ Rgb hapke_mean_albedo(const Surface& s) noexcept {
     return {band(s.diffuse.x), band(s.diffuse.y), band(s.diffuse.z)};
 }
 
-}  // namespace narpa::lobes
+}  // namespace
+
+constinit const BsdfKind kinds::hapke{.name = "hapke",
+                                      .keys = kHapkeKeys,
+                                      .read = hapke_read,
+                                      .f = hapke_f,
+                                      .pdf = hapke_pdf,
+                                      .direction = hapke_direction,
+                                      .ambient = hapke_ambient,
+                                      .energy_key = "albedo"};
+
+}  // namespace narpa

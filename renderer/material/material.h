@@ -32,32 +32,36 @@ struct Hapke {
     float roughness_rad = 0;                        ///< macroscopic mean slope, theta-bar
 };
 
+/// A row of the table of kinds: bsdf_kind.h.
+struct BsdfKind;
+namespace kinds {
+extern const BsdfKind lambert;          ///< diffuse
+extern const BsdfKind phong;            ///< diffuse, specular, exponent: diffuse + specular <= 1
+extern const BsdfKind phong_classic;    ///< diffuse, specular, exponent, ambient: the paper's; direct light only
+extern const BsdfKind mirror;           ///< specular
+extern const BsdfKind dielectric;       ///< smooth glass: ior, schlick
+extern const BsdfKind ggx;              ///< diffuse (base colour), metallic, roughness, ior
+extern const BsdfKind lommel_seeliger;  ///< diffuse (single scattering albedo w), asymmetry
+extern const BsdfKind lunar_lambert;    ///< diffuse (normal albedo): McEwen 1996
+extern const BsdfKind akimov;           ///< diffuse (normal albedo): Shkuratov et al. 2011
+extern const BsdfKind hapke;            ///< diffuse (single scattering albedo w), hapke
+}  // namespace kinds
+
 /// How a surface scatters light. Directions and forms: renderer/material/bsdf.h. Each kind uses only the parameters
-/// listed with it.
+/// that are listed with it above.
 struct Material {
-    enum class Kind : std::uint8_t {
-        lambert,          ///< diffuse
-        phong,            ///< diffuse, specular, exponent: Lafortune and Willems 1994, diffuse + specular <= 1
-        phong_classic,    ///< diffuse, specular, exponent, ambient: the paper's, no BRDF; direct light only
-        mirror,           ///< specular
-        dielectric,       ///< smooth glass: ior, schlick
-        ggx,              ///< diffuse (base colour), metallic, roughness, ior
-        lommel_seeliger,  ///< diffuse (single scattering albedo w), asymmetry
-        lunar_lambert,    ///< diffuse (normal albedo): McEwen 1996
-        hapke,            ///< diffuse (single scattering albedo w), hapke
-    };
     std::string name;
-    Kind kind = Kind::lambert;
-    Rgb diffuse{0.5f, 0.5f, 0.5f};  ///< kd, or as listed with the kind
-    Rgb specular{};                 ///< ks
-    float exponent = 1;             ///< n of Phong's lobe
-    Rgb emission{};                 ///< emitted radiance, W m^-2 sr^-1
-    Rgb ambient{};                  ///< ka
-    float roughness = 0.5f;         ///< perceptual: GGX alpha = roughness^2
-    float metallic = 0;             ///< 0 dielectric over Lambert, 1 metal
-    float ior = 1.5f;               ///< refractive index inside over outside
-    bool schlick = false;           ///< Schlick's approximation in place of Fresnel's equations
-    float asymmetry = 0;            ///< Henyey-Greenstein's g of the single particle: negative is backward
+    const BsdfKind* kind = &kinds::lambert;  ///< never null
+    Rgb diffuse{0.5f, 0.5f, 0.5f};           ///< kd, base colour, normal albedo or w, depending on the kind
+    Rgb specular{};                          ///< ks
+    float exponent = 1;                      ///< n of Phong's lobe
+    Rgb emission{};                          ///< emitted radiance, W m^-2 sr^-1
+    Rgb ambient{};                           ///< ka
+    float roughness = 0.5f;                  ///< perceptual: GGX alpha = roughness^2
+    float metallic = 0;                      ///< 0 dielectric over Lambert, 1 metal
+    float ior = 1.5f;                        ///< refractive index inside over outside
+    bool schlick = false;                    ///< Schlick's approximation in place of Fresnel's equations
+    float asymmetry = 0;                     ///< Henyey-Greenstein's g of the single particle: negative is backward
     Hapke hapke{};
     int texture = -1;           ///< index into Scene::textures: multiplies `diffuse`; -1 is none
     int emission_texture = -1;  ///< multiplies `emission`

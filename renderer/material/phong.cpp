@@ -1,17 +1,42 @@
 // Phong's lobe: sampling for the BRDF (Lafortune and Willems 1994), and the paper's form, which is not a BRDF.
 #include <cmath>
+#include <limits>
+#include <string>
 
+#include "base/constants.h"
+#include "renderer/keys/toml_reader.h"
 #include "renderer/material/directions.h"
 #include "renderer/material/fresnel.h"
-#include "renderer/material/lobes.h"
+#include "renderer/material/material_keys.h"
+#include "renderer/material/phong_lobe.h"
 
-namespace narpa::lobes {
+namespace narpa {
 namespace {
+
+constexpr float kPhongInvPi = static_cast<float>(1 / kPi);
+constexpr std::string_view kPhongKeys[] = {"albedo",           "texture",       "specular",    "exponent",
+                                           "specular_texture", "cloud_texture", "cloud_albedo"};
+constexpr std::string_view kClassicKeys[] = {"albedo",   "texture", "specular",
+                                             "exponent", "ambient", "specular_texture"};
+
+void phong_read(TableReader& table, Material& m) {
+    const std::string kind(m.kind->name);
+    read_albedo(table, m);
+    table.require("specular", "a number or [r, g, b] in [0, 1], as the kind is \"" + kind + "\"");
+    table.require("exponent", "a number in [0, 10000], as the kind is \"" + kind + "\"");
+    m.specular = table.rgb("specular", kUnit).value_or(Rgb{});
+    m.exponent = static_cast<float>(table.number("exponent", {.low = 0, .high = 1e4}).value_or(m.exponent));
+}
+
+void read_phong_classic(TableReader& table, Material& m) {
+    phong_read(table, m);
+    m.ambient = table.rgb("ambient", kUnit).value_or(m.ambient);
+}
 
 /// Share of the samples for the lobe: by the albedos, each at its largest. A wide lobe leaves more to the cosine,
 /// which keeps the largest weight below twice the mean down to n = 0.
 double lobe_share(const Surface& s) {
-    const double d = mean(s.diffuse), l = mean(s.specular), n = static_cast<double>(s.exponent);
+    const double d = band_mean(s.diffuse), l = band_mean(s.specular), n = static_cast<double>(s.exponent);
     return l > 0 ? l / (d + l) * n / (n + 1) : 0;
 }
 
@@ -20,17 +45,18 @@ double lobe_density(double cosine, double exponent) {
     return cosine > 0 ? (exponent + 1) / (2 * kPi) * std::pow(std::min(cosine, 1.0), exponent) : 0;
 }
 
-}  // namespace
+Rgb phong_f(const Surface& s, const BsdfGeometry& g) noexcept {
+    return s.diffuse * kPhongInvPi + s.specular * phong_lobe(2 * g.n_l * g.n_v - g.l_v, s.exponent);
+}
 
 // Lobe directions below the surface are mirrored to above it: no sample is lost, and the density of a direction is
 // the sum of the lobe's there and in its mirror image.
-double phong_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept {
-    const double n_l = dot(n, l), n_v = dot(n, v), share = lobe_share(s),
-                 exponent = static_cast<double>(s.exponent);
-    double pdf = (1 - share) * n_l / kPi;
-    if (share <= 0) return pdf;
-    const double above = 2 * n_l * n_v - dot(l, v);
-    return pdf + share * (lobe_density(above, exponent) + lobe_density(above - 2 * n_l * n_v, exponent));
+double phong_pdf(const Surface& s, const BsdfGeometry& g) noexcept {
+    const double share = lobe_share(s), exponent = static_cast<double>(s.exponent);
+    const double cosine = (1 - share) * g.n_l / kPi;
+    if (share <= 0) return cosine;
+    const double above = 2 * g.n_l * g.n_v - g.l_v;
+    return cosine + share * (lobe_density(above, exponent) + lobe_density(above - 2 * g.n_l * g.n_v, exponent));
 }
 
 Vec3 phong_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
@@ -40,11 +66,40 @@ Vec3 phong_direction(const Surface& s, const Vec3& n, const Vec3& v, const Rando
 }
 
 // f (n.l) = (kd (n.l) + ks (r.v)^n) / pi. Below n.l = 1e-6 f stops growing: 0.2 arcsec above the horizon.
-Rgb phong_classic_f(const Surface& s, double n_l, double n_v, double l_v) noexcept {
-    const double r_v = 2 * n_l * n_v - l_v;
-    if (r_v <= 0) return s.diffuse * static_cast<float>(1 / kPi);
-    const double lobe = std::pow(std::min(r_v, 1.0), static_cast<double>(s.exponent)) / std::max(n_l, 1e-6);
-    return (s.diffuse + s.material->specular * static_cast<float>(lobe)) * static_cast<float>(1 / kPi);
+Rgb phong_classic_f(const Surface& s, const BsdfGeometry& g) noexcept {
+    const double r_v = 2 * g.n_l * g.n_v - g.l_v;
+    if (r_v <= 0) return s.diffuse * kPhongInvPi;
+    const double lobe = std::pow(std::min(r_v, 1.0), static_cast<double>(s.exponent)) / std::max(g.n_l, 1e-6);
+    return (s.diffuse + s.material->specular * static_cast<float>(lobe)) * kPhongInvPi;
 }
 
-}  // namespace narpa::lobes
+Rgb unbounded(const Material&) noexcept {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    return {kInfinity, kInfinity, kInfinity};
+}
+
+}  // namespace
+
+constinit const BsdfKind kinds::phong{
+    .name = "phong",
+    .keys = kPhongKeys,
+    .read = phong_read,
+    .lambert_or_phong = true,
+    .has_lobe = true,
+    .f = phong_f,
+    .pdf = phong_pdf,
+    .direction = phong_direction,
+    .largest_albedo = [](const Material& m) noexcept { return m.diffuse + m.specular; },
+    .energy_key = "specular"};
+
+constinit const BsdfKind kinds::phong_classic{
+    .name = "phong_classic",
+    .keys = kClassicKeys,
+    .read = read_phong_classic,
+    .has_lobe = true,
+    .direct_only = true,
+    .f = phong_classic_f,
+    .ambient = [](const Surface& s) noexcept { return s.material->ambient; },
+    .largest_albedo = unbounded};
+
+}  // namespace narpa

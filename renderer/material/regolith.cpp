@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/constants.h"
+#include "renderer/keys/toml_reader.h"
 #include "renderer/material/directions.h"
-#include "renderer/material/lobes.h"
+#include "renderer/material/material_keys.h"
 
 namespace narpa {
 
@@ -39,41 +41,50 @@ double lunar_lambert_weight(double phase_rad) noexcept {
     return std::max(0.0, 1 + a * (-0.019 + a * (2.42e-4 - a * 1.46e-6)));
 }
 
-namespace lobes {
+namespace {
 
-// f = w / (4 pi) p(a) / (n.l + n.v)
-Rgb lommel_seeliger_f(const Surface& s, double n_l, double n_v, double l_v) noexcept {
-    const double p = henyey_greenstein(static_cast<double>(s.material->asymmetry), l_v);
-    return s.diffuse * static_cast<float>(p / (4 * kPi * (n_l + n_v)));
+constexpr std::string_view kSeeligerKeys[] = {"albedo", "texture", "asymmetry"};
+
+void read_lommel_seeliger(TableReader& table, Material& m) {
+    read_albedo(table, m);
+    m.asymmetry = static_cast<float>(table.number("asymmetry", {.low = -0.95, .high = 0.95}).value_or(m.asymmetry));
 }
 
-double lommel_seeliger_pdf(const Surface& s, const Vec3& n, const Vec3& l, const Vec3& v) noexcept {
-    const double g = static_cast<double>(s.material->asymmetry), l_v = dot(l, v);
-    const double mirrored = l_v - 2 * dot(n, l) * dot(n, v);
-    return (henyey_greenstein(g, l_v) + henyey_greenstein(g, mirrored)) / (4 * kPi);
+double asymmetry(const Surface& s) noexcept {
+    return static_cast<double>(s.material->asymmetry);
+}
+
+// f = w / (4 pi) p(a) / (n.l + n.v)
+Rgb lommel_seeliger_f(const Surface& s, const BsdfGeometry& g) noexcept {
+    return s.diffuse * static_cast<float>(henyey_greenstein(asymmetry(s), g.l_v) / (4 * kPi * (g.n_l + g.n_v)));
+}
+
+double lommel_seeliger_pdf(const Surface& s, const BsdfGeometry& g) noexcept {
+    const double mirrored = g.l_v - 2 * g.n_l * g.n_v;
+    return (henyey_greenstein(asymmetry(s), g.l_v) + henyey_greenstein(asymmetry(s), mirrored)) / (4 * kPi);
 }
 
 Vec3 lommel_seeliger_direction(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
-    const double cosine = henyey_greenstein_cosine(static_cast<double>(s.material->asymmetry), u[1]);
+    const double cosine = henyey_greenstein_cosine(asymmetry(s), u[1]);
     return folded(Basis(v).to_world(direction_at(cosine, u[2])), n);
 }
 
 Rgb lommel_seeliger_mean_albedo(const Surface& s) noexcept {
-    return s.diffuse * static_cast<float>(lommel_seeliger_bond_albedo(static_cast<double>(s.material->asymmetry)));
+    return s.diffuse * static_cast<float>(lommel_seeliger_bond_albedo(asymmetry(s)));
 }
 
 // f = A / pi (2 L(a) / (n.l + n.v) + 1 - L(a))
-Rgb lunar_lambert_f(const Surface& s, double n_l, double n_v, double l_v) noexcept {
-    const double weight = lunar_lambert_weight(std::acos(std::clamp(l_v, -1.0, 1.0)));
-    return s.diffuse * static_cast<float>((2 * weight / (n_l + n_v) + 1 - weight) / kPi);
+Rgb lunar_lambert_f(const Surface& s, const BsdfGeometry& g) noexcept {
+    const double weight = lunar_lambert_weight(std::acos(std::clamp(g.l_v, -1.0, 1.0)));
+    return s.diffuse * static_cast<float>((2 * weight / (g.n_l + g.n_v) + 1 - weight) / kPi);
 }
 
 // Half uniform over the hemisphere (for the Lommel-Seeliger part), half as Lambert's.
-double lunar_lambert_pdf(const Vec3& n, const Vec3& l) noexcept {
-    return 0.25 / kPi + 0.5 * dot(n, l) / kPi;
+double lunar_lambert_pdf(const Surface&, const BsdfGeometry& g) noexcept {
+    return 0.25 / kPi + 0.5 * g.n_l / kPi;
 }
 
-Vec3 lunar_lambert_direction(const Vec3& n, const Random3& u) noexcept {
+Vec3 lunar_lambert_direction(const Surface&, const Vec3& n, const Vec3&, const Random3& u) noexcept {
     return u[0] < 0.5 ? Basis(n).to_world(direction_at(1 - u[1], u[2])) : cosine_direction(n, u[1], u[2]);
 }
 
@@ -82,5 +93,26 @@ Rgb lunar_lambert_mean_albedo(const Surface& s) noexcept {
     return s.diffuse * 1.2117f;
 }
 
-}  // namespace lobes
+}  // namespace
+
+constinit const BsdfKind kinds::lommel_seeliger{.name = "lommel_seeliger",
+                                                .keys = kSeeligerKeys,
+                                                .read = read_lommel_seeliger,
+                                                .f = lommel_seeliger_f,
+                                                .pdf = lommel_seeliger_pdf,
+                                                .direction = lommel_seeliger_direction,
+                                                .ambient = lommel_seeliger_mean_albedo};
+
+constinit const BsdfKind kinds::lunar_lambert{
+    .name = "lunar_lambert",
+    .keys = kAlbedoKeys,
+    .read = read_albedo,
+    .f = lunar_lambert_f,
+    .pdf = lunar_lambert_pdf,
+    .direction = lunar_lambert_direction,
+    .ambient = lunar_lambert_mean_albedo,
+    .largest_albedo =
+        [](const Material& m) noexcept { return m.diffuse * static_cast<float>(kLunarLambertLargest); },
+    .energy_key = "albedo"};
+
 }  // namespace narpa

@@ -1,10 +1,18 @@
 // Mirror and clear dielectric: delta distributions.
+#include "renderer/keys/toml_reader.h"
 #include "renderer/material/fresnel.h"
-#include "renderer/material/lobes.h"
+#include "renderer/material/material_keys.h"
 
-namespace narpa::lobes {
+namespace narpa {
+namespace {
 
-BsdfSample mirror_sample(const Surface& s, const Vec3& n, const Vec3& v) noexcept {
+constexpr std::string_view kMirrorKeys[] = {"reflectance"}, kDielectricKeys[] = {"ior", "fresnel"};
+
+void read_mirror(TableReader& table, Material& m) {
+    m.specular = table.rgb("reflectance", kUnit).value_or(Rgb{1, 1, 1});
+}
+
+BsdfSample mirror_sample(const Surface& s, const Vec3& n, const Vec3& v, const Random3&) noexcept {
     BsdfSample sample;
     sample.l = reflect(-v, n);
     sample.weight = s.material->specular;
@@ -14,14 +22,14 @@ BsdfSample mirror_sample(const Surface& s, const Vec3& n, const Vec3& v) noexcep
 
 // Refraction preserves radiance / n^2 (E. Veach 1997, section 5.2): towards the viewer's side the radiance is
 // multiplied by (n_viewer / n_beyond)^2, which cancels between entering and leaving a body.
-BsdfSample dielectric_sample(const Surface& s, const Vec3& n, const Vec3& v, double choice) noexcept {
+BsdfSample dielectric_sample(const Surface& s, const Vec3& n, const Vec3& v, const Random3& u) noexcept {
     const Material& m = *s.material;
     const double ior = static_cast<double>(m.ior), eta = s.outside ? ior : 1 / ior,
                  cos_i = std::min(1.0, dot(n, v));
     const double reflected = m.schlick ? fresnel_schlick(cos_i, eta) : fresnel_dielectric(cos_i, eta);
     BsdfSample sample;
     sample.specular = true;
-    if (choice < reflected) {
+    if (u[0] < reflected) {
         sample.l = reflect(-v, n);
         sample.weight = {1, 1, 1};
         return sample;
@@ -33,4 +41,31 @@ BsdfSample dielectric_sample(const Surface& s, const Vec3& n, const Vec3& v, dou
     return sample;
 }
 
-}  // namespace narpa::lobes
+}  // namespace
+
+constinit const BsdfKind kinds::mirror{.name = "mirror",
+                                       .keys = kMirrorKeys,
+                                       .read = read_mirror,
+                                       .has_lobe = true,
+                                       .is_delta = true,
+                                       .is_mirror = true,
+                                       .sample = mirror_sample,
+                                       .ambient = [](const Surface& s) noexcept { return s.material->specular; },
+                                       .largest_albedo = [](const Material& m) noexcept { return m.specular; }};
+
+constinit const BsdfKind kinds::dielectric{
+    .name = "dielectric",
+    .keys = kDielectricKeys,
+    .read = [](TableReader& table, Material& m) { read_fresnel(table, m, 0.1, 10); },
+    .is_delta = true,
+    .sample = dielectric_sample,
+    .ambient =
+        [](const Surface&) noexcept {
+            return Rgb{1, 1, 1};
+        },  // clear glass loses no light
+    .largest_albedo =
+        [](const Material&) noexcept {
+            return Rgb{1, 1, 1};
+        }};
+
+}  // namespace narpa

@@ -12,17 +12,6 @@ namespace narpa {
 template <class Kind, std::size_t N>
 using KindNames = std::array<std::pair<std::string_view, Kind>, N>;
 
-inline constexpr KindNames<Material::Kind, 9> kMaterialKinds{{
-    {"lambert", Material::Kind::lambert},
-    {"phong", Material::Kind::phong},
-    {"phong_classic", Material::Kind::phong_classic},
-    {"mirror", Material::Kind::mirror},
-    {"dielectric", Material::Kind::dielectric},
-    {"ggx", Material::Kind::ggx},
-    {"lommel_seeliger", Material::Kind::lommel_seeliger},
-    {"lunar_lambert", Material::Kind::lunar_lambert},
-    {"hapke", Material::Kind::hapke},
-}};
 inline constexpr KindNames<Light::Kind, 4> kLightKinds{{
     {"point", Light::Kind::point},
     {"directional", Light::Kind::directional},

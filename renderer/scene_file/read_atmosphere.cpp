@@ -56,7 +56,7 @@ void read_ground(TableReader& table, const Body& body, const SceneReading& readi
         const int material = std::holds_alternative<Sphere>(body.shape) ? std::get<Sphere>(body.shape).material
                                                                         : std::get<Ellipsoid>(body.shape).material;
         const Material& m = reading.scene.materials[static_cast<std::size_t>(material)];
-        if (m.kind == Material::Kind::lambert && !names_texture(reading, material))
+        if (m.kind == &kinds::lambert && !names_texture(reading, material))
             air.ground_albedo = std::min(1.0, static_cast<double>(mean_band(m.diffuse)));
     }
     air.ground_albedo = table.number("ground_albedo", kUnit).value_or(air.ground_albedo);

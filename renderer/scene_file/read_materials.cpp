@@ -2,9 +2,8 @@
 
 #include <array>
 
-#include "base/constants.h"
 #include "renderer/material/albedo.h"
-#include "renderer/scene_file/kind_names.h"
+#include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -15,69 +14,18 @@ namespace {
 constexpr Rgb kCloudAlbedo{0.75f, 0.75f, 0.75f};
 constexpr Range kRadiance{.low = 0, .high = 1e30};
 
-/// Keys of each kind beside those that all have: emission, normals, heights.
-const std::array<KindKeys, 9> kKindKeys{{
-    {"lambert", {"albedo", "texture", "cloud_texture", "cloud_albedo"}},
-    {"phong", {"albedo", "texture", "specular", "exponent", "specular_texture", "cloud_texture", "cloud_albedo"}},
-    {"phong_classic", {"albedo", "texture", "specular", "exponent", "ambient", "specular_texture"}},
-    {"mirror", {"reflectance"}},
-    {"dielectric", {"ior", "fresnel"}},
-    {"ggx", {"albedo", "texture", "metallic", "roughness", "ior", "fresnel"}},
-    {"lommel_seeliger", {"albedo", "texture", "asymmetry"}},
-    {"lunar_lambert", {"albedo", "texture"}},
-    {"hapke", {"albedo", "texture", "b", "c", "opposition_b0", "opposition_h", "roughness_deg"}},
-}};
-
 /// Records a problem where the surface would reflect more than it receives.
 void check_energy(TableReader& table, const Material& m) {
-    using enum Material::Kind;
-    if (m.kind != phong && m.kind != lunar_lambert && m.kind != hapke)
-        return;                                              // the ranges of their keys ensure it
-    const float rounding = m.kind == hapke ? 5e-3f : 1e-6f;  // of largest_albedo: by quadrature, or exact
+    if (m.kind->energy_key.empty()) return;
+    const float rounding = m.kind->largest_albedo == nullptr ? 5e-3f : 1e-6f;  // by quadrature, or exact
     const Rgb most = largest_albedo(m);
     for (int b = 0; b < 3; ++b)
         if (!(most[b] <= 1 + rounding))
             return table.fail(
-                m.kind == phong ? "specular" : "albedo",
+                m.kind->energy_key,
                 fmt::format("this surface sends back up to {:.3g} times the light that falls on it, in "
                             "band {}, expected at most 1",
                             most[b], b));
-}
-
-void read_specular(TableReader& table, Material& m) {
-    const std::string_view kind = name_of(m.kind, kMaterialKinds);
-    if (m.kind == Material::Kind::phong || m.kind == Material::Kind::phong_classic) {
-        table.require("specular", fmt::format("a number or [r, g, b] in [0, 1], as the kind is \"{}\"", kind));
-        table.require("exponent", fmt::format("a number in [0, 10000], as the kind is \"{}\"", kind));
-    }
-    m.specular = table.rgb("specular", kUnit).value_or(Rgb{});
-    if (m.kind == Material::Kind::mirror) m.specular = table.rgb("reflectance", kUnit).value_or(Rgb{1, 1, 1});
-    m.exponent = static_cast<float>(table.number("exponent", {.low = 0, .high = 1e4}).value_or(m.exponent));
-    m.ambient = table.rgb("ambient", kUnit).value_or(m.ambient);
-}
-
-void read_fresnel(TableReader& table, Material& m) {
-    static constexpr std::array<std::pair<std::string_view, bool>, 2> kFresnel{
-        {{"exact", false}, {"schlick", true}}};
-    constexpr Range kGlass{.low = 0.1, .high = 10}, kCoat{.low = 1, .high = 3};
-    const bool glass = m.kind == Material::Kind::dielectric;
-    m.ior = static_cast<float>(table.number("ior", glass ? kGlass : kCoat).value_or(m.ior));
-    m.schlick = table.choice<bool>("fresnel", kFresnel).value_or(m.schlick);
-    m.metallic = static_cast<float>(table.number("metallic", kUnit).value_or(m.metallic));
-    m.roughness = static_cast<float>(table.number("roughness", kUnit).value_or(m.roughness));
-}
-
-void read_regolith(TableReader& table, Material& m) {
-    const auto number = [&table](const char* key, const Range& range, float otherwise) {
-        return static_cast<float>(table.number(key, range).value_or(otherwise));
-    };
-    m.asymmetry = number("asymmetry", {.low = -0.95, .high = 0.95}, m.asymmetry);
-    m.hapke.phase_b = number("b", {.low = 0, .high = 0.95}, m.hapke.phase_b);
-    m.hapke.phase_c = number("c", {.low = -1, .high = 1}, m.hapke.phase_c);
-    m.hapke.opposition_b0 = number("opposition_b0", {.low = 0, .high = 10}, m.hapke.opposition_b0);
-    m.hapke.opposition_h = number("opposition_h", {.low = 0, .high = 10, .low_open = true}, m.hapke.opposition_h);
-    if (const auto degrees = table.number("roughness_deg", {.low = 0, .high = 60}))
-        m.hapke.roughness_rad = static_cast<float>(*degrees * kPi / 180);
 }
 
 /// {file = "FILE", wrap = ..., colour = ...}; the last for colours only.
@@ -142,20 +90,27 @@ void read_textures(TableReader& table, Material& m, SceneReading& reading) {
     if (table.has("height_texture")) table.require("bump_height_m", "a number: how high white stands above black");
 }
 
+void refuse_keys_of_other_kinds(TableReader& table, const BsdfKind& kind) {
+    static const std::vector<KindKeys> all = [] {
+        std::vector<KindKeys> keys;
+        for (const BsdfKind* k : bsdf_kinds()) keys.push_back({k->name, {k->keys.begin(), k->keys.end()}});
+        return keys;
+    }();
+    table.refuse_keys_of_other_kinds(kind.name, all);
+}
+
 /// Reads everything but the kind.
 void read_parameters(TableReader& table, Material& m, SceneReading& reading) {
-    table.refuse_keys_of_other_kinds(name_of(m.kind, kMaterialKinds), kKindKeys);
-    m.diffuse = table.rgb("albedo", kUnit).value_or(m.diffuse);
-    read_specular(table, m);
-    read_fresnel(table, m);
-    read_regolith(table, m);
+    refuse_keys_of_other_kinds(table, *m.kind);
+    m.kind->read(table, m);
     if (reading.problems.none()) check_energy(table, m);
     m.retroreflectance =
         static_cast<float>(table.number("retroreflectance", {.low = 0, .high = 1e6}).value_or(m.retroreflectance));
     m.emission = table.rgb("emission", kRadiance).value_or(Rgb{});
     read_textures(table, m, reading);
-    if (m.kind == Material::Kind::phong_classic && reading.scene.render.method == RenderSettings::Method::path)
-        table.fail("kind", "\"phong_classic\" keeps no energy, expected \"phong\" where method = \"path\"");
+    if (m.kind->direct_only && reading.scene.render.method == RenderSettings::Method::path)
+        table.fail("kind",
+                   fmt::format("\"{}\" keeps no energy, expected \"phong\" where method = \"path\"", m.kind->name));
     table.finish();
 }
 
@@ -166,7 +121,9 @@ std::optional<int> read_material(TableReader& body, const std::string& name, Sce
     if (!table) return std::nullopt;
     Material m;
     m.name = name;
-    const auto kind = table->choice<Material::Kind>("kind", kMaterialKinds);
+    std::vector<std::pair<std::string_view, const BsdfKind*>> names;
+    for (const BsdfKind* k : bsdf_kinds()) names.emplace_back(k->name, k);
+    const auto kind = table->choice<const BsdfKind*>("kind", names);
     if (kind) m.kind = *kind;
     if (kind || !table->has("kind")) read_parameters(*table, m, reading);
     reading.scene.materials.push_back(std::move(m));

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "renderer/keys/based_on.h"
-#include "renderer/scene_file/kind_names.h"
+#include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -33,9 +33,8 @@ void read_root(TableReader& root, SceneReading& reading) {
 void warn_of_dark_materials(Scene& scene) {
     std::string names;
     for (const Material& m : scene.materials)
-        if (m.kind == Material::Kind::mirror || m.kind == Material::Kind::dielectric)
-            names +=
-                fmt::format("{}\"{}\" ({})", names.empty() ? "" : ", ", m.name, name_of(m.kind, kMaterialKinds));
+        if (m.kind->is_delta)
+            names += fmt::format("{}\"{}\" ({})", names.empty() ? "" : ", ", m.name, m.kind->name);
     if (names.empty()) return;
     const std::string warning =
         fmt::format("black in direct light: {}; method = \"path\" in [render] shows them", names);
@@ -66,12 +65,11 @@ Result<Scene> read_files(const std::string& path) {
 
 Status use_method(Scene& scene, RenderSettings::Method method) {
     for (const Material& m : scene.materials)
-        if (m.kind == Material::Kind::phong_classic && method == RenderSettings::Method::path)
-            return Error{
-                .what = fmt::format("material \"{}\" is \"phong_classic\", which keeps no energy, expected "
-                                    "\"phong\" for method path",
-                                    m.name),
-                .file = scene.file};
+        if (m.kind->direct_only && method == RenderSettings::Method::path)
+            return Error{.what = fmt::format("material \"{}\" is \"{}\", which keeps no energy, expected "
+                                             "\"phong\" for method path",
+                                             m.name, m.kind->name),
+                         .file = scene.file};
     scene.render.method = method;
     warn_of_dark_materials(scene);
     return Ok{};

@@ -20,9 +20,9 @@ const std::string kComplete = test::source_path("tests/data/scenes/complete.toml
 
 TEST(UseMethod, RefusesWhatKeepsNoEnergyAndWarnsOfWhatIsDark) {
     Scene s;
-    s.materials = {{.name = "old", .kind = Material::Kind::phong_classic}};
+    s.materials = {{.name = "old", .kind = &kinds::phong_classic}};
     EXPECT_FALSE(use_method(s, RenderSettings::Method::path));
-    s.materials = {{.name = "pane", .kind = Material::Kind::dielectric}};
+    s.materials = {{.name = "pane", .kind = &kinds::dielectric}};
     EXPECT_TRUE(use_method(s, RenderSettings::Method::direct));
     EXPECT_EQ(s.warnings.size(), 1u);
     EXPECT_TRUE(use_method(s, RenderSettings::Method::path));

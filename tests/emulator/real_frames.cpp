@@ -140,7 +140,7 @@ protected:
 /// independent rasteriser reaches an overlap of 0.876.
 TEST_F(ErosFrame, FitsARenderAtThePublishedPose) {
     Material& rock = scene.materials[0];
-    rock.kind = Material::Kind::hapke;
+    rock.kind = &kinds::hapke;
     rock.hapke.phase_b = 0.25F, rock.hapke.phase_c = 1, rock.hapke.roughness_rad = 28 * static_cast<float>(kDegree);
     rock.hapke.opposition_b0 = 1.4F, rock.hapke.opposition_h = 0.01F;
     Camera& camera = scene.cameras[0];

@@ -28,7 +28,7 @@ inline void check(const Material& m, int textures) {
     for (const int t :
          {m.texture, m.emission_texture, m.specular_texture, m.cloud_texture, m.normal_texture, m.height_texture})
         require(t < textures, "textures are in range");
-    const bool adds_up = m.kind == Material::Kind::phong;
+    const bool adds_up = m.kind == &kinds::phong;
     for (int b = 0; b < 3; ++b) {
         require(m.diffuse[b] >= 0 && m.specular[b] >= 0 && m.emission[b] >= 0 && m.ambient[b] >= 0,
                 "no colour below 0");

@@ -58,7 +58,7 @@ LidarSweep look_at(const Target& target, std::mt19937_64& random, double lost = 
             at.set(0, moved(kPose, kMotion, t_s));
             const Hit hit = target.tracer.intersect(at, {{}, beam}, 200);
             const bool mirror =
-                hit.body >= 0 && target.scene.materials[std::size_t(hit.material)].kind == Material::Kind::mirror;
+                hit.body >= 0 && target.scene.materials[std::size_t(hit.material)].kind == &kinds::mirror;
             if (hit.body < 0 || mirror || chance(random) < lost)
                 out.empty.push_back({{}, beam, t_s});
             else
@@ -112,7 +112,7 @@ TEST(EmptyBeams, CorrectPosesAreNotRefused) {
 TEST(EmptyBeams, SurfacesWithUncertainReturnRefuseNothing) {
     std::mt19937_64 random(3);
     Material mirror;
-    mirror.kind = Material::Kind::mirror;
+    mirror.kind = &kinds::mirror;
     mirror.specular = {0.9F, 0.9F, 0.9F};
     const Target mirrored(tug(2, mirror));
     const LidarSweep sweep = look_at(mirrored, random);

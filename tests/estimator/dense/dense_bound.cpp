@@ -122,7 +122,7 @@ TEST(DenseBound, ErrorsOfNoiseReachTheBound) {
     scene.sun = Sun{normalized(Vec3{0.6, -0.3, -0.7}), 1361, 0};
     scene.ambient = {20, 20, 20};
     Material m;
-    m.kind = Material::Kind::phong;
+    m.kind = &kinds::phong;
     m.diffuse = {0.2f, 0.2f, 0.2f};
     m.specular = {0.6f, 0.6f, 0.6f};
     m.exponent = 12;

@@ -127,7 +127,7 @@ TEST(ImageDerivative, OfALambertEllipsoid) {
 
 TEST(ImageDerivative, OfALobeThatFollowsTheViewer) {
     Material m;
-    m.kind = Material::Kind::phong;
+    m.kind = &kinds::phong;
     m.diffuse = {0.2f, 0.2f, 0.2f};
     m.specular = {0.6f, 0.6f, 0.6f};
     m.exponent = 12;
@@ -136,7 +136,7 @@ TEST(ImageDerivative, OfALobeThatFollowsTheViewer) {
 
 TEST(ImageDerivative, OfRoughMetal) {
     Material m;
-    m.kind = Material::Kind::ggx;
+    m.kind = &kinds::ggx;
     m.diffuse = {0.8f, 0.8f, 0.8f};
     m.metallic = 1;
     m.roughness = 0.6f;

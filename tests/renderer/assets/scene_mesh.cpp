@@ -172,11 +172,11 @@ TEST(MeshFile, MtlBecomesLambertAndPhong) {
     ASSERT_EQ(cube.materials.size(), 2u) << "only those that are used";
     const MeshMaterial& painted = cube.materials[0];
     EXPECT_EQ(painted.material.name, "painted panel");
-    EXPECT_EQ(painted.material.kind, Material::Kind::lambert);
+    EXPECT_EQ(painted.material.kind, &kinds::lambert);
     EXPECT_EQ(painted.material.diffuse, (Rgb{0.8f, 0.8f, 0.8f}));
     EXPECT_EQ(painted.colour.file, data_file("checker.ppm"));
     const Material& foil = cube.materials[1].material;
-    EXPECT_EQ(foil.kind, Material::Kind::phong);
+    EXPECT_EQ(foil.kind, &kinds::phong);
     EXPECT_FLOAT_EQ(foil.diffuse.x, 0.5f / 1.25f);  // 0.5 + 0.75 > 1: both divided by the largest sum
     EXPECT_FLOAT_EQ(foil.specular.x, 0.75f / 1.25f);
     EXPECT_FLOAT_EQ(foil.specular.z, 0.3f / 1.25f);
@@ -320,7 +320,7 @@ TEST(MeshFile, GltfNodesAndMaterialsAreApplied) {
     EXPECT_EQ(low->x, 4);
     EXPECT_EQ(high->x, 5);
     const Material& material = m.materials.at(m.mesh.face_material[0]).material;
-    EXPECT_EQ(material.kind, Material::Kind::ggx);
+    EXPECT_EQ(material.kind, &kinds::ggx);
     EXPECT_EQ(material.diffuse, (Rgb{0.8f, 0.4f, 0.2f}));
     EXPECT_EQ(material.metallic, 0.25f);
     EXPECT_EQ(material.roughness, 0.5f);

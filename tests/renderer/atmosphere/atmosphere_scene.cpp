@@ -129,13 +129,13 @@ TEST(AtmosphereInAScene, AnAirlessSceneHasNoMedium) {
 
 TEST(AtmosphereInAScene, DimsALidarTwice) {
     Scene s = earth_scene(40);
-    const AtmosphereMedium medium(s, 2);
+    const auto medium = AtmosphereMedium(s, 2).for_lidar();
     const auto render_scene = RenderScene::create(s, 1);
     ASSERT_TRUE(render_scene);
     const Ray beam{{0, 0, 6'371'000 + 3000}, {0, 0, -1}, 0};
     const ShotSettings vacuum{.range_max_m = 1e5};
     ShotSettings air = vacuum;
-    air.medium = &medium;
+    air.medium = medium.get();
     const LidarReturn clear = shoot(render_scene->tracer(), placed(s), beam, vacuum);
     const LidarReturn dimmed = shoot(render_scene->tracer(), placed(s), beam, air);
     EXPECT_DOUBLE_EQ(clear.range_m, dimmed.range_m);

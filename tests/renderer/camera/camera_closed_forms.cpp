@@ -149,7 +149,7 @@ TEST(ClosedForm, DirectLightOfALampIsThatOfPathsWithOneSurface) {
 }
 
 TEST(ClosedForm, MirrorsAndGlassAreBlackInDirectLight) {
-    for (const auto kind : {Material::Kind::mirror, Material::Kind::dielectric}) {
+    for (const auto kind : {&kinds::mirror, &kinds::dielectric}) {
         Scene s;
         Material m = lambert(0);
         m.kind = kind;

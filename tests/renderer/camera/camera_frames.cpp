@@ -18,7 +18,7 @@ Scene craft_over_a_globe() {
     Scene s;
     s.materials.push_back(lambert(0.4f));
     Material shiny = lambert(0.2f);
-    shiny.kind = Material::Kind::phong;
+    shiny.kind = &kinds::phong;
     shiny.specular = {0.5f, 0.4f, 0.3f};
     shiny.exponent = 30;
     s.materials.push_back(shiny);
@@ -83,10 +83,10 @@ TEST(CameraFrame, AlbedoHasTheTextureAndTheColourOfMirrorsAndGlass) {
     s.materials.push_back(m);
     s.textures.push_back({"t", 2, 1, {65535, 0, 0, 0, 65535, 0}});  // red left, green right
     m = lambert(0.5f);
-    m.kind = Material::Kind::mirror;
+    m.kind = &kinds::mirror;
     m.specular = {0.9f, 0.8f, 0.7f};
     s.materials.push_back(m);
-    m.kind = Material::Kind::dielectric;
+    m.kind = &kinds::dielectric;
     s.materials.push_back(m);
     add_mesh(s, plate(4, 4));
     const Camera c = camera(9, 9, 40);

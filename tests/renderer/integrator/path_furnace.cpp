@@ -1,5 +1,6 @@
 // Light in an even environment: what comes back follows from the albedo alone, whatever the shape.
 #include "renderer/light/small_body_sampling.h"
+#include "renderer/material/bsdf_kind.h"
 #include "tests/renderer/integrator/path_support.h"
 
 namespace narpa {
@@ -131,14 +132,13 @@ TEST(Furnace, NormalMapsNeitherMakeNorLoseLight) {
 }
 
 TEST(Furnace, NoMaterialReflectsMoreThanItReceives) {
-    using Kind = Material::Kind;
-    for (const Kind kind : {Kind::lambert, Kind::phong, Kind::mirror, Kind::dielectric, Kind::ggx,
-                            Kind::lommel_seeliger, Kind::lunar_lambert, Kind::hapke}) {
+    for (const BsdfKind* kind : {&kinds::lambert, &kinds::phong, &kinds::mirror, &kinds::dielectric, &kinds::ggx,
+                                 &kinds::lommel_seeliger, &kinds::lunar_lambert, &kinds::akimov, &kinds::hapke}) {
         Scene s;
-        s.materials.push_back(phong(kind == Kind::phong           ? 0.5f
-                                    : kind == Kind::lunar_lambert ? 0.58f
-                                    : kind == Kind::hapke         ? 0.9f
-                                                                  : 1,
+        s.materials.push_back(phong(kind == &kinds::phong                                     ? 0.5f
+                                    : kind == &kinds::lunar_lambert || kind == &kinds::akimov ? 0.58f
+                                    : kind == &kinds::hapke                                   ? 0.9f
+                                                                                              : 1,
                                     0.5f, 8));
         s.materials[0].kind = kind;
         s.materials[0].metallic = 1;
@@ -149,8 +149,8 @@ TEST(Furnace, NoMaterialReflectsMoreThanItReceives) {
         for (const Vec3& target : {Vec3{0, 0, 0}, Vec3{0, 0.5, 0.3}, Vec3{0, -0.3, 0.8}, Vec3{0, 0.2, -0.9}}) {
             const Estimate e =
                 light_along(*render_scene, placed(s), ray_to({4, 0.1, 0.2}, target), {.max_depth = 40}, 256);
-            EXPECT_LT(e.mean.x, 1 + kSigmas * e.error + 1e-4) << static_cast<int>(kind);
-            EXPECT_GT(e.mean.x, 0.05) << static_cast<int>(kind);
+            EXPECT_LT(e.mean.x, 1 + kSigmas * e.error + 1e-4) << kind->name;
+            EXPECT_GT(e.mean.x, 0.05) << kind->name;
         }
     }
 }
@@ -160,7 +160,7 @@ TEST(Furnace, ASmallBodyInTheSkyNeitherMakesNorLosesLight) {
     for (const float roughness : {0.3f, 0.6f, 1.0f}) {
         Scene s;
         s.materials = {lambert(1), lambert(1)};
-        s.materials[0].kind = Material::Kind::ggx;
+        s.materials[0].kind = &kinds::ggx;
         s.materials[0].metallic = 1;
         s.materials[0].roughness = roughness;
         s.ambient = {1, 1, 1};

@@ -9,7 +9,7 @@ namespace {
 using namespace test;
 Material metal(float roughness) {
     Material m = lambert(0.8f);
-    m.kind = Material::Kind::ggx;
+    m.kind = &kinds::ggx;
     m.metallic = 1;
     m.roughness = roughness;
     return m;

@@ -85,20 +85,20 @@ inline Material shining(float albedo, const Rgb& emission) {
 }
 inline Material phong(float diffuse, float specular, float exponent) {
     Material m = lambert(diffuse);
-    m.kind = Material::Kind::phong;
+    m.kind = &kinds::phong;
     m.specular = {specular, specular, specular};
     m.exponent = exponent;
     return m;
 }
 inline Material mirror(float reflectance) {
     Material m = lambert(0);
-    m.kind = Material::Kind::mirror;
+    m.kind = &kinds::mirror;
     m.specular = {reflectance, reflectance, reflectance};
     return m;
 }
 inline Material glass(float ior) {
     Material m = lambert(0);
-    m.kind = Material::Kind::dielectric;
+    m.kind = &kinds::dielectric;
     m.ior = ior;
     return m;
 }

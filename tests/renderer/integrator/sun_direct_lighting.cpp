@@ -93,14 +93,14 @@ Scene motley() {
     m.emission = {1, 2, 3};
     s.materials.push_back(m);
     m = lambert(0.2f);
-    m.kind = Material::Kind::phong;
+    m.kind = &kinds::phong;
     m.specular = {0.3f, 0.4f, 0.5f};
     m.exponent = 40;
     s.materials.push_back(m);
     m.exponent = 5000;
     s.materials.push_back(m);
-    for (const auto kind : {Material::Kind::phong_classic, Material::Kind::ggx, Material::Kind::hapke,
-                            Material::Kind::lommel_seeliger, Material::Kind::mirror}) {
+    for (const auto kind :
+         {&kinds::phong_classic, &kinds::ggx, &kinds::hapke, &kinds::lommel_seeliger, &kinds::mirror}) {
         m.kind = kind;
         s.materials.push_back(m);
     }

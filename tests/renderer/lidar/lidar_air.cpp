@@ -90,28 +90,27 @@ TEST(LidarAir, LidarRatioIsThePhaseFunctionsOrTheScenes) {
 }
 
 /// Even fog.
-class Fog final : public Medium {
+class Fog final : public LidarMedium {
 public:
     Fog(double pi_beta_1_m, double alpha_1_m) : pi_beta_1_m_(pi_beta_1_m), alpha_1_m_(alpha_1_m) {}
-    [[nodiscard]] MediumSegment along(const BodyPoses&, const Ray&, double, double) const noexcept override {
-        return {};
+    [[nodiscard]] double transmittance(const BodyPoses&, const Ray&, double range_m) const noexcept override {
+        return std::exp(-alpha_1_m_ * range_m);
     }
-    [[nodiscard]] Rgb transmittance(const BodyPoses&, const Ray&, double range_m) const noexcept override {
-        const auto t = static_cast<float>(std::exp(-alpha_1_m_ * range_m));
-        return {t, t, t};
+    [[nodiscard]] double in_scattering(const BodyPoses&, const Ray&, double, double) const noexcept override {
+        return 0;
     }
-    [[nodiscard]] Backscatter lidar_backscatter(const BodyPoses&, const Ray&, double from_m,
-                                                double to_m) const noexcept override {
+    [[nodiscard]] Backscatter backscatter(const BodyPoses&, const Ray&, double from_m,
+                                          double to_m) const noexcept override {
         return {lidar_equation(pi_beta_1_m_, alpha_1_m_, from_m, to_m), 0.5 * (from_m + to_m)};
     }
-    [[nodiscard]] double max_lidar_backscatter_1_m() const noexcept override { return pi_beta_1_m_; }
+    [[nodiscard]] double max_backscatter_1_m() const noexcept override { return pi_beta_1_m_; }
 
 private:
     double pi_beta_1_m_, alpha_1_m_;
 };
 
 /// Shots along z, at a white plate at a distance, or at none.
-std::vector<LidarEchoes> shots_in(const Medium* medium, const LidarReceiverModel& model, double plate_m,
+std::vector<LidarEchoes> shots_in(const LidarMedium* medium, const LidarReceiverModel& model, double plate_m,
                                   std::size_t n, std::uint64_t seed = 1) {
     Scene scene;
     scene.materials.push_back(lambert(0.5f));

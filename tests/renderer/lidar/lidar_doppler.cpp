@@ -73,7 +73,7 @@ TEST(LidarDoppler, OfAMirroredPathIsTheRateOfItsLength) {
     Scene scene;
     scene.materials.push_back(lambert(0.5f));
     scene.materials.push_back(lambert(0));
-    scene.materials.back().kind = Material::Kind::mirror;
+    scene.materials.back().kind = &kinds::mirror;
     scene.materials.back().specular = {1, 1, 1};
     Mesh mirror = plate(3, 3);
     mirror.face_material.assign(mirror.faces.size(), 1);

@@ -249,7 +249,7 @@ TEST(LidarReceiver, RetroreflectorsAreFoundFarBeyondDiffuseSurfaces) {
 /// A mirror at 45 degrees, 10 m ahead, and a plate 7 m to its side.
 TEST(LidarReceiver, MirrorsSendNothingBackUnlessBeamsGoOn) {
     TargetRange target({0.5, 0.5});
-    target.scene.materials[1].kind = Material::Kind::mirror;
+    target.scene.materials[1].kind = &kinds::mirror;
     target.scene.materials[1].specular = {0.9f, 0.9f, 0.9f};
     target.add(10, kPi / 4, 3, 0, 1);
     add_mesh(target.scene, plate(4, 4), {exp_rotation({0, kPi / 2, 0}), {-7, 0, 10}});

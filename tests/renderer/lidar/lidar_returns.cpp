@@ -17,7 +17,7 @@ using namespace test;
 
 Material glossy(float diffuse, float specular, float exponent) {
     Material m = lambert(diffuse);
-    m.kind = Material::Kind::phong;
+    m.kind = &kinds::phong;
     m.specular = {specular, 0.5f * specular, 0.25f * specular};
     m.exponent = exponent;
     return m;
@@ -31,7 +31,7 @@ Scene balls() {
                    lambert(0.9f), glossy(0.2f, 0.3f, 7),  lambert(0.5f),      lambert(0.4f)};
     s.materials[2].retroreflectance = 3;
     s.materials[4].texture = s.materials[5].texture = 0;
-    s.materials[6].kind = Material::Kind::lommel_seeliger;
+    s.materials[6].kind = &kinds::lommel_seeliger;
     s.materials[7].texture = s.materials[7].emission_texture = 0;
     for (std::size_t i = 0; i < s.materials.size(); ++i)
         add_sphere(s, 1, {2.1 * static_cast<double>(i), 0, 10}, static_cast<int>(i));

@@ -38,7 +38,7 @@ public:
 /// From the origin along these directions. Of a receiver that hears all.
 std::vector<LidarEchoes> shots(const RenderScene& render_scene, const LidarReceiverModel& model,
                                const Vec3& direction, std::size_t n) {
-    return shots_along(direction, render_scene, model, n, {.medium = render_scene.medium()});
+    return shots_along(direction, render_scene, model, n, {.medium = render_scene.lidar_medium()});
 }
 
 /// What a camera's pixel sees there, in units of a white surface that faces the Sun.
@@ -141,7 +141,7 @@ TEST(LidarSunlitAir, OfAPlanetIsThatAtItsWavelength) {
     const BodyPoses at = placed(scene);
     for (const Vec3& direction : {Vec3{0, 0, 1}, Vec3{0, 1, 0.2}, Vec3{-0.5, 0.2, 0.5}}) {
         const Ray ray{{}, normalized(direction)};
-        const double sky = kPi / kSun_w_m2 * with_air->medium()->lidar_in_scattering(at, ray, kInfinity, 0);
+        const double sky = kPi / kSun_w_m2 * with_air->lidar_medium()->in_scattering(at, ray, kInfinity, 0);
         const double seen = pixel(*as_a_camera, ray.direction);
         EXPECT_GT(seen, 1e-3);
         EXPECT_NEAR(sky, seen, 0.01 * seen) << direction.x;
@@ -149,7 +149,7 @@ TEST(LidarSunlitAir, OfAPlanetIsThatAtItsWavelength) {
     // Clear sky is fainter there than in red light, haze as bright.
     const Ray zenith{{}, {0, 0, 1}};
     const double red = static_cast<double>(with_air->medium()->along(at, zenith, kInfinity, 0).in_scattering.x);
-    EXPECT_LT(with_air->medium()->lidar_in_scattering(at, zenith, kInfinity, 0), 0.6 * red);
+    EXPECT_LT(with_air->lidar_medium()->in_scattering(at, zenith, kInfinity, 0), 0.6 * red);
 }
 
 /// An instrument that does not look at sunlight pays nothing: no second set of tables.
@@ -163,7 +163,7 @@ TEST(LidarSunlitAir, IsMadeForLidarsThatSeeSunlightAlone) {
     scene.lidars.emplace_back().receiver = {.range_at_10_percent_m = 1e5};
     const auto with_air = RenderScene::create(scene, 1);
     ASSERT_TRUE(with_air);
-    EXPECT_EQ(with_air->medium()->lidar_in_scattering(placed(scene), {{}, {0, 0, 1}}, kInfinity, 0), 0);
+    EXPECT_EQ(with_air->lidar_medium()->in_scattering(placed(scene), {{}, {0, 0, 1}}, kInfinity, 0), 0);
     EXPECT_EQ(shots(*with_air, scene.lidars[0].receiver, {0, 0, -1}, 1)[0].sunlight, 0);
 }
 

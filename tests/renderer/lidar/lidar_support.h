@@ -14,7 +14,7 @@ namespace narpa::test {
 
 struct ShotOptions {
     std::uint64_t seed = 1;
-    const Medium* medium = nullptr;
+    const LidarMedium* medium = nullptr;
     std::span<const Motion> motions{};
     double range_max_m = 1e4;
 };

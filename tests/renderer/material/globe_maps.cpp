@@ -22,7 +22,7 @@ Texture even(double value) {
 Scene globe(Texture ocean) {
     Scene s;
     Material m = lambert(0.1f);
-    m.kind = Material::Kind::phong;
+    m.kind = &kinds::phong;
     m.specular = {0.5f, 0.4f, 0.3f};
     m.exponent = 20;
     m.specular_texture = 0;

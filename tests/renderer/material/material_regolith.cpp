@@ -1,6 +1,7 @@
 // Soils of airless bodies: phase curves of whole discs against their closed forms, and published albedos.
 #include <gtest/gtest.h>
 
+#include "renderer/material/albedo.h"
 #include "renderer/material/regolith.h"
 #include "tests/renderer/material/material_support.h"
 
@@ -8,7 +9,6 @@ namespace narpa {
 namespace {
 
 using namespace test;
-using MaterialKind = Material::Kind;
 
 /// What a unit sphere under irradiance 1 sends to a far viewer at phase angle a; a flat Lambert disc of albedo 1
 /// that faces both sends 1, so this is the geometric albedo times the phase function. Photometric latitude and
@@ -52,7 +52,7 @@ double seeliger_phase(double a) {
 constexpr double kPhaseAngles[] = {0, 1, 5, 20, 45, 70, 90, 120, 150, 170};
 
 TEST(DiscIntegrated, LambertSphereTo0_1PerCent) {
-    const TestMaterial m = material("lambert", MaterialKind::lambert, 0.6);
+    const TestMaterial m = material("lambert", &kinds::lambert, 0.6);
     for (const double degrees : kPhaseAngles) {
         const double a = degrees * kPi / 180, expected = 0.6 * 2 / 3 * lambert_phase(a);
         EXPECT_NEAR(disc(m, a), expected, 1e-3 * expected) << degrees;
@@ -65,7 +65,7 @@ TEST(DiscIntegrated, LambertSphereTo0_1PerCent) {
 TEST(DiscIntegrated, LommelSeeligerSphereTo0_1PerCent) {
     for (const float g : {0.0f, -0.3f, 0.2f, -0.6f}) {
         const TestMaterial m =
-            material("seeliger", MaterialKind::lommel_seeliger, 0.4, [&](Material& x) { x.asymmetry = g; });
+            material("seeliger", &kinds::lommel_seeliger, 0.4, [&](Material& x) { x.asymmetry = g; });
         for (const double degrees : kPhaseAngles) {
             const double a = degrees * kPi / 180, asymmetry = static_cast<double>(g);
             const double particle = (1 - asymmetry * asymmetry) /
@@ -82,11 +82,53 @@ TEST(DiscIntegrated, LommelSeeligerSphereTo0_1PerCent) {
 
 // Its directional albedo: w / 2 (1 - mu ln((1 + mu) / mu)).
 TEST(LommelSeeliger, DirectionalAlbedoIsItsClosedForm) {
-    const TestMaterial m = material("seeliger", MaterialKind::lommel_seeliger, 0.8);
+    const TestMaterial m = material("seeliger", &kinds::lommel_seeliger, 0.8);
     for (const double mu : {0.05, 0.3, 0.7, 1.0}) {
         const double expected = 0.4 * (1 - mu * std::log((1 + mu) / mu));
         EXPECT_NEAR(albedo(m, at_angle(std::acos(mu))), expected, 2e-3 * expected) << mu;
     }
+}
+
+// A / pi * cos(a / 2) times the integrals over longitude, 2 (pi - a) / pi, and latitude, of cos^p with p = 2 + a /
+// (pi - a): sqrt(pi) Gamma((p + 1) / 2) / Gamma(p / 2 + 1).
+TEST(DiscIntegrated, AkimovSphereTo0_1PerCent) {
+    const TestMaterial m = material("akimov", &kinds::akimov, 0.12);
+    for (const double degrees : kPhaseAngles) {
+        const double a = degrees * kPi / 180, p = 2 + a / (kPi - a);
+        const double latitude = std::sqrt(kPi) * std::tgamma((p + 1) / 2) / std::tgamma(p / 2 + 1);
+        const double expected = 0.12 / kPi * std::cos(a / 2) * 2 * (kPi - a) / kPi * latitude;
+        EXPECT_NEAR(disc(m, a), expected, 1e-3 * expected) << degrees;
+    }
+}
+
+// The radiance factor pi f n.l over the albedo is the disk function, here in photometric latitude and longitude.
+TEST(Akimov, IsTheDiskFunctionInPhotometricCoordinates) {
+    const TestMaterial m = material("akimov", &kinds::akimov, 0.3);
+    const Surface s = m.surface();
+    const Vec3 v{1, 0, 0};
+    for (const double a : {1e-7, 0.02, 0.7, 1.5, 2.6, 3.1})
+        for (const double latitude : {0.0, 0.5, 1.4})
+            for (const double place : {0.01, 0.3, 0.5, 0.9, 0.99}) {
+                const double longitude = a - kPi / 2 + place * (kPi - a);  // from terminator to limb
+                const Vec3 n{std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
+                             std::sin(latitude)};
+                const Vec3 l{std::cos(a), std::sin(a), 0};
+                const double expected = std::cos(a / 2) * std::cos(kPi / (kPi - a) * (longitude - a / 2)) *
+                                        std::pow(std::cos(latitude), a / (kPi - a)) / std::cos(longitude);
+                EXPECT_NEAR(band(bsdf(s, n, l, v)) * kPi * dot(n, l) / 0.3, expected, 1e-5 * (1 + expected))
+                    << a << " " << latitude << " " << place;
+            }
+    const Vec3 n = at_angle(1.2);
+    EXPECT_NEAR(band(bsdf(s, n, v, v)) * kPi * dot(n, v), 0.3, 1e-6) << "flat at full phase";
+}
+
+TEST(Akimov, SendsBackNoMoreThanItGetsBelowItsLargestAlbedo) {
+    const Rgb largest = largest_albedo(material("akimov", &kinds::akimov, 1).material);
+    double most = 0;
+    for (double degrees = 60; degrees < 89.9; degrees += 0.5)
+        most = std::max(most, albedo(material("akimov", &kinds::akimov, 1), at_angle(degrees * kPi / 180)));
+    EXPECT_LE(most, band(largest) * 1.001);
+    EXPECT_GE(most, band(largest) * 0.998);
 }
 
 TEST(HenyeyGreenstein, HasMeanOneAndItsAsymmetry) {
@@ -108,7 +150,7 @@ TEST(HenyeyGreenstein, HasMeanOneAndItsAsymmetry) {
 // McEwen 1996: at full phase a Lommel-Seeliger disc, without limb darkening, of the normal albedo; further on a
 // mixture whose disc is that of its two parts.
 TEST(LunarLambert, IsFlatAtFullPhaseAndMixesBeyond) {
-    const TestMaterial m = material("moon", MaterialKind::lunar_lambert, 0.12);
+    const TestMaterial m = material("moon", &kinds::lunar_lambert, 0.12);
     const Surface s = m.surface();
     for (const double degrees : {0.0, 30.0, 60.0, 85.0}) {
         const Vec3 v = at_angle(degrees * kPi / 180);
@@ -159,7 +201,7 @@ TEST(Hapke, IsotropicGrainsMeetChandrasekharsSolution) {
     EXPECT_NEAR(ExactH(1).at(1), 2.9078, 2e-3);  // S. Chandrasekhar, "Radiative Transfer", table XI
     for (const double w : {0.1, 0.5, 0.9, 1.0}) {
         const ExactH h(w);
-        const TestMaterial m = material("hapke", MaterialKind::hapke, w, [](Material& x) {
+        const TestMaterial m = material("hapke", &kinds::hapke, w, [](Material& x) {
             x.hapke = {0, 0, 0, 0.05f, 0};
         });
         Random random(8);
@@ -176,8 +218,7 @@ TEST(Hapke, IsotropicGrainsMeetChandrasekharsSolution) {
 TEST(Hapke, SmoothSphereMeetsItsDiscIntegratedForm) {
     for (const double w : {0.05, 0.3, 0.7}) {
         const Hapke parameters{0.3f, 0.5f, 0.8f, 0.08f, 0};
-        const TestMaterial m =
-            material("hapke", MaterialKind::hapke, w, [&](Material& x) { x.hapke = parameters; });
+        const TestMaterial m = material("hapke", &kinds::hapke, w, [&](Material& x) { x.hapke = parameters; });
         const double gamma = std::sqrt(1 - w), r0 = (1 - gamma) / (1 + gamma);
         for (const double degrees : {0.0, 2.0, 10.0, 40.0, 80.0, 120.0, 150.0}) {
             const double a = degrees * kPi / 180, b = 0.3, c = 0.5;
@@ -194,15 +235,15 @@ TEST(Hapke, SmoothSphereMeetsItsDiscIntegratedForm) {
 }
 
 TEST(Hapke, DarkGrainsAreLommelSeeligerAndSlopesVanishWithTheirAngle) {
-    const TestMaterial dark = material("dark", MaterialKind::hapke, 1e-4, [](Material& m) {
+    const TestMaterial dark = material("dark", &kinds::hapke, 1e-4, [](Material& m) {
         m.hapke = {0.4f, 1, 0, 0.05f, 0};
     });
     const TestMaterial seeliger =
-        material("seeliger", MaterialKind::lommel_seeliger, 1e-4, [](Material& m) { m.asymmetry = -0.4f; });
-    const TestMaterial smooth = material("smooth", MaterialKind::hapke, 0.4, [](Material& m) {
+        material("seeliger", &kinds::lommel_seeliger, 1e-4, [](Material& m) { m.asymmetry = -0.4f; });
+    const TestMaterial smooth = material("smooth", &kinds::hapke, 0.4, [](Material& m) {
         m.hapke = {0.3f, 0.5f, 1, 0.1f, 0};
     });
-    const TestMaterial slopes = material("slopes", MaterialKind::hapke, 0.4, [](Material& m) {
+    const TestMaterial slopes = material("slopes", &kinds::hapke, 0.4, [](Material& m) {
         m.hapke = {0.3f, 0.5f, 1, 0.1f, 1e-4f};
     });
     Random random(9);
@@ -221,7 +262,7 @@ TEST(Hapke, DarkGrainsAreLommelSeeligerAndSlopesVanishWithTheirAngle) {
 // theta-bar).
 TEST(Hapke, SlopesDarkenLargePhases) {
     const auto soil = [](float roughness) {
-        return material("soil", MaterialKind::hapke, 0.2, [=](Material& m) {
+        return material("soil", &kinds::hapke, 0.2, [=](Material& m) {
             m.hapke = {0.3f, 0.5f, 0, 0.1f, roughness};
         });
     };
@@ -266,7 +307,7 @@ inline constexpr PublishedHapke kPublishedHapke[] = {
 TEST(Hapke, PublishedParametersGiveThePublishedAlbedo) {
     for (const PublishedHapke& body : kPublishedHapke) {
         const TestMaterial m =
-            material(body.body, MaterialKind::hapke, static_cast<double>(body.single_scattering_albedo),
+            material(body.body, &kinds::hapke, static_cast<double>(body.single_scattering_albedo),
                      [&](Material& x) { x.hapke = body.parameters; });
         EXPECT_NEAR(disc(m, 0), body.geometric_albedo, body.geometric_albedo > 0.1 ? 0.005 : 0.0005) << body.body;
     }

@@ -49,7 +49,7 @@ TEST_P(EveryMaterial, DensityIntegratesToOne) {
         // side.
         EXPECT_LT(whole, 1.005) << degrees;
         // Mirror directions about visible normals may fall below the surface; the other kinds lose none.
-        EXPECT_GT(whole, GetParam().material.kind == Material::Kind::ggx ? 0.5 : 0.995) << degrees;
+        EXPECT_GT(whole, GetParam().material.kind == &kinds::ggx ? 0.5 : 0.995) << degrees;
     }
 }
 
@@ -123,31 +123,30 @@ TEST_P(EveryMaterial, DoesNotDependOnTheWorldsAxes) {
 // Shading normals and rounding bring any directions at all.
 TEST(BsdfHardCases, NothingIsNegativeInfiniteOrNoNumber) {
     std::vector<TestMaterial> all = broad_materials();
-    using Kind = Material::Kind;
     for (const float roughness : {0.0f, 0.003f, 0.05f, 1.0f})
         for (const float metallic : {0.0f, 1.0f})
             for (const float ior : {1.0f, 1.5f, 3.0f})
-                all.push_back(material("ggx", Kind::ggx, 1, [&](Material& m) {
+                all.push_back(material("ggx", &kinds::ggx, 1, [&](Material& m) {
                     m.roughness = roughness, m.metallic = metallic, m.ior = ior, m.schlick = ior == 3.0f;
                 }));
     for (const float exponent : {0.0f, 1.0f, 1e4f}) {
         const auto set = [&](Material& m) { m.exponent = exponent, m.specular = grey(1); };
-        all.push_back(material("phong", Kind::phong, 0, set));
-        all.push_back(material("phong_classic", Kind::phong_classic, 0.2, set));
+        all.push_back(material("phong", &kinds::phong, 0, set));
+        all.push_back(material("phong_classic", &kinds::phong_classic, 0.2, set));
     }
     for (const float ior : {1.0f, 1.00027f, 1.5f, 2.4f})
         for (const bool schlick : {false, true})
-            all.push_back(material("dielectric", Kind::dielectric, 0,
+            all.push_back(material("dielectric", &kinds::dielectric, 0,
                                    [&](Material& m) { m.ior = ior, m.schlick = schlick; }));
-    all.push_back(material("mirror", Kind::mirror, 0, [](Material& m) { m.specular = grey(0.9); }));
-    all.push_back(material("hapke_extreme", Kind::hapke, 1, [](Material& m) {
+    all.push_back(material("mirror", &kinds::mirror, 0, [](Material& m) { m.specular = grey(0.9); }));
+    all.push_back(material("hapke_extreme", &kinds::hapke, 1, [](Material& m) {
         m.hapke = {0.95f, 1, 5, 1e-4f, 1.2f};
     }));
-    all.push_back(material("hapke_black", Kind::hapke, 0, [](Material& m) {
+    all.push_back(material("hapke_black", &kinds::hapke, 0, [](Material& m) {
         m.hapke = {0.5f, -1, 0, 0.1f, 1e-6f};
     }));
     all.push_back(
-        material("seeliger_extreme", Kind::lommel_seeliger, 1, [](Material& m) { m.asymmetry = -0.99f; }));
+        material("seeliger_extreme", &kinds::lommel_seeliger, 1, [](Material& m) { m.asymmetry = -0.99f; }));
 
     Random random(5);
     const auto direction = [&]() -> Vec3 {
@@ -199,8 +198,8 @@ TEST(BsdfHardCases, NothingIsNegativeInfiniteOrNoNumber) {
 // and 1.05 for n = 1e4 with the lobe alone.
 TEST(PhongSampling, NoWeightIsTwiceTheMean) {
     for (const float exponent : {0.0f, 1.0f, 10.0f, 100.0f, 1e4f}) {
-        const TestMaterial m = material("phong", Material::Kind::phong, 0,
-                                        [&](Material& p) { p.specular = grey(1), p.exponent = exponent; });
+        const TestMaterial m =
+            material("phong", &kinds::phong, 0, [&](Material& p) { p.specular = grey(1), p.exponent = exponent; });
         const Surface s = m.surface();
         Random random(6);
         const Vec3 v = at_angle(kPi / 4);

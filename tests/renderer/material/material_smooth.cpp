@@ -66,8 +66,8 @@ TEST(SmoothInterface, WhatIsNotReflectedGoesThroughAndCancelsOnTheWayOut) {
     Random random(11);
     for (const bool schlick : {false, true})
         for (const float ior : {1.0f, 1.33f, 1.5f, 2.4f, 0.7f}) {
-            const TestMaterial glass = material("glass", Material::Kind::dielectric, 0,
-                                                [&](Material& m) { m.ior = ior, m.schlick = schlick; });
+            const TestMaterial glass =
+                material("glass", &kinds::dielectric, 0, [&](Material& m) { m.ior = ior, m.schlick = schlick; });
             Surface s = glass.surface();
             for (int i = 0; i < 2000; ++i) {
                 s.outside = true;
@@ -101,7 +101,7 @@ TEST(SmoothInterface, WhatIsNotReflectedGoesThroughAndCancelsOnTheWayOut) {
 }
 
 TEST(SmoothInterface, InsideBeyondTheCriticalAngleNothingGoesThrough) {
-    const TestMaterial glass = material("glass", Material::Kind::dielectric, 0, [](Material& m) { m.ior = 1.5f; });
+    const TestMaterial glass = material("glass", &kinds::dielectric, 0, [](Material& m) { m.ior = 1.5f; });
     Surface s = glass.surface();
     s.outside = false;
     const double critical = std::asin(1 / 1.5);
@@ -115,7 +115,7 @@ TEST(SmoothInterface, InsideBeyondTheCriticalAngleNothingGoesThrough) {
 }
 
 TEST(Mirror, ReflectsItsShareIntoOneDirection) {
-    const TestMaterial m = material("mirror", Material::Kind::mirror, 0, [](Material& x) {
+    const TestMaterial m = material("mirror", &kinds::mirror, 0, [](Material& x) {
         x.specular = {0.9f, 0.6f, 0.3f};
     });
     const Surface s = m.surface();

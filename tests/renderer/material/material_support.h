@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/constants.h"
-#include "renderer/material/bsdf.h"
+#include "renderer/material/bsdf_kind.h"
 #include "renderer/material/directions.h"
 
 namespace narpa::test {
@@ -23,7 +23,7 @@ struct TestMaterial {
 
     [[nodiscard]] Surface surface() const {
         Surface s{material.diffuse, {}, {}, material.exponent, &material, {0, 0, 1}, true};
-        if (material.kind == Material::Kind::phong) s.specular = material.specular;
+        if (material.kind == &kinds::phong) s.specular = material.specular;
         return s;
     }
 };
@@ -37,7 +37,7 @@ inline Rgb grey(double value) {
     return {v, v, v};
 }
 
-inline TestMaterial material(std::string name, Material::Kind kind, double diffuse,
+inline TestMaterial material(std::string name, const BsdfKind* kind, double diffuse,
                              const std::function<void(Material&)>& rest = {}) {
     TestMaterial m{std::move(name), {}};
     m.material.kind = kind;
@@ -48,7 +48,6 @@ inline TestMaterial material(std::string name, Material::Kind kind, double diffu
 
 /// One or more of each kind that scatters, none with lobes narrower than some degrees.
 inline std::vector<TestMaterial> broad_materials() {
-    using Kind = Material::Kind;
     const auto phong = [](double ks, float n) {
         return [=](Material& m) { m.specular = grey(ks), m.exponent = n; };
     };
@@ -58,25 +57,27 @@ inline std::vector<TestMaterial> broad_materials() {
     };
     const auto hapke = [](Hapke h) { return [=](Material& m) { m.hapke = h; }; };
     return {
-        material("lambert", Kind::lambert, 0.7),
-        material("phong_lobe_0", Kind::phong, 0, phong(0.9, 0)),
-        material("phong_lobe_1", Kind::phong, 0, phong(1, 1)),
-        material("phong_mixed", Kind::phong, 0.4, phong(0.5, 40)),
-        material("phong_narrow", Kind::phong, 0.1, phong(0.8, 300)),
-        material("ggx_metal_0.3", Kind::ggx, 0.9, ggx(0.3f, 1)),
-        material("ggx_metal_0.6", Kind::ggx, 1, ggx(0.6f, 1)),
-        material("ggx_metal_1", Kind::ggx, 1, ggx(1, 1)),
-        material("ggx_dielectric_0.3", Kind::ggx, 0.8, ggx(0.3f, 0)),
-        material("ggx_dielectric_0.8", Kind::ggx, 1, ggx(0.8f, 0, 2.0f)),
-        material("ggx_schlick", Kind::ggx, 0.5, ggx(0.5f, 0, 1.33f, true)),
-        material("ggx_half_metal", Kind::ggx, 0.6, ggx(0.4f, 0.5f)),
-        material("lommel_seeliger", Kind::lommel_seeliger, 0.8),
-        material("lommel_seeliger_backward", Kind::lommel_seeliger, 0.5, [](Material& m) { m.asymmetry = -0.4f; }),
-        material("lommel_seeliger_forward", Kind::lommel_seeliger, 0.5, [](Material& m) { m.asymmetry = 0.3f; }),
-        material("lunar_lambert", Kind::lunar_lambert, 0.12),
-        material("hapke_isotropic", Kind::hapke, 0.9, hapke({0, 0, 0, 0.05f, 0})),
-        material("hapke_smooth", Kind::hapke, 0.5, hapke({0.3f, 0.4f, 1.0f, 0.1f, 0})),
-        material("hapke_rough", Kind::hapke, 0.33, hapke({0.25f, 1.0f, 1.4f, 0.05f, 0.489f})),
+        material("lambert", &kinds::lambert, 0.7),
+        material("phong_lobe_0", &kinds::phong, 0, phong(0.9, 0)),
+        material("phong_lobe_1", &kinds::phong, 0, phong(1, 1)),
+        material("phong_mixed", &kinds::phong, 0.4, phong(0.5, 40)),
+        material("phong_narrow", &kinds::phong, 0.1, phong(0.8, 300)),
+        material("ggx_metal_0.3", &kinds::ggx, 0.9, ggx(0.3f, 1)),
+        material("ggx_metal_0.6", &kinds::ggx, 1, ggx(0.6f, 1)),
+        material("ggx_metal_1", &kinds::ggx, 1, ggx(1, 1)),
+        material("ggx_dielectric_0.3", &kinds::ggx, 0.8, ggx(0.3f, 0)),
+        material("ggx_dielectric_0.8", &kinds::ggx, 1, ggx(0.8f, 0, 2.0f)),
+        material("ggx_schlick", &kinds::ggx, 0.5, ggx(0.5f, 0, 1.33f, true)),
+        material("ggx_half_metal", &kinds::ggx, 0.6, ggx(0.4f, 0.5f)),
+        material("lommel_seeliger", &kinds::lommel_seeliger, 0.8),
+        material("lommel_seeliger_backward", &kinds::lommel_seeliger, 0.5,
+                 [](Material& m) { m.asymmetry = -0.4f; }),
+        material("lommel_seeliger_forward", &kinds::lommel_seeliger, 0.5, [](Material& m) { m.asymmetry = 0.3f; }),
+        material("lunar_lambert", &kinds::lunar_lambert, 0.12),
+        material("akimov", &kinds::akimov, 0.12),
+        material("hapke_isotropic", &kinds::hapke, 0.9, hapke({0, 0, 0, 0.05f, 0})),
+        material("hapke_smooth", &kinds::hapke, 0.5, hapke({0.3f, 0.4f, 1.0f, 0.1f, 0})),
+        material("hapke_rough", &kinds::hapke, 0.33, hapke({0.25f, 1.0f, 1.4f, 0.05f, 0.489f})),
     };
 }
 
@@ -111,7 +112,7 @@ inline double integral(const Vec3& peak, const std::function<double(const Vec3&)
 
 /// Where the narrowest part of the material's f lies.
 inline Vec3 peak_of(const Material& m, const Vec3& v) {
-    return m.kind >= Material::Kind::lommel_seeliger ? v : Vec3{-v.x, -v.y, v.z};
+    return m.kind->lambert_or_phong || m.kind == &kinds::ggx || m.kind->direct_only ? Vec3{-v.x, -v.y, v.z} : v;
 }
 
 inline double band(const Rgb& c) {

@@ -145,7 +145,7 @@ TEST(NormalMap, IsAveragedAndAPhongLobeWidened) {
     std::vector<Vec3> normals;
     for (int i = 0; i < 64 * 64; ++i) normals.push_back(i % 2 ? left : right);
     Scene s = with_normals(normals_of(normals, 64));
-    s.materials[0].kind = Material::Kind::phong;
+    s.materials[0].kind = &kinds::phong;
     s.materials[0].exponent = 1000;
     add_mesh(s, plate(1, 1));
     const Seen far = see(s, {0.1, 0.2, 5}, {0.1, 0.2, 0}, 0.2);
@@ -155,7 +155,7 @@ TEST(NormalMap, IsAveragedAndAPhongLobeWidened) {
     const Seen near = see(s, {0.5 / 64, 0.2, 5}, {0.5 / 64, 0.2, 0}, 1e-5);
     expect_near(near.surface.normal, right, 1e-4);
     EXPECT_EQ(near.surface.exponent, 1000);
-    s.materials[0].kind = Material::Kind::phong_classic;
+    s.materials[0].kind = &kinds::phong_classic;
     EXPECT_EQ(see(s, {0.1, 0.2, 5}, {0.1, 0.2, 0}, 0.2).surface.exponent, 1000);
 }
 

@@ -275,7 +275,7 @@ TEST(Surface, WithoutTexturesIsTheMaterial) {
     m.emission = {1, 2, 3};
     m.specular = {0.1f, 0.2f, 0.3f};  // a kind without a lobe has none, whatever its fields hold
     s.materials.push_back(m);
-    m.kind = Material::Kind::ggx;
+    m.kind = &kinds::ggx;
     s.materials.push_back(m);
     add_sphere(s, 1, {}, 0);
     const auto tracer = Tracer::create(s, 1);

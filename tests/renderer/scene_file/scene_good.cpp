@@ -65,7 +65,7 @@ TEST(SceneFile, ReadsSurroundings) {
 
 TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
     const Scene s = read_good(data_file("complete.toml"));
-    ASSERT_EQ(s.bodies.size(), 9u);
+    ASSERT_EQ(s.bodies.size(), 10u);
     const Body& target = s.bodies[0];
     EXPECT_EQ(target.name, "target");
     EXPECT_EQ(target.initial.T_world_body.t, (Vec3{10, 0, 0}));
@@ -82,7 +82,7 @@ TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
 
     const Mesh& overridden = s.meshes[static_cast<std::size_t>(std::get<int>(s.bodies[1].shape))];
     const Material& phong = s.materials[overridden.face_material.front()];
-    EXPECT_EQ(phong.kind, Material::Kind::phong);
+    EXPECT_EQ(phong.kind, &kinds::phong);
     EXPECT_EQ(phong.specular, (Rgb{0.3f, 0.3f, 0.3f}));
     EXPECT_EQ(phong.exponent, 40);
     ASSERT_GE(phong.texture, 0);

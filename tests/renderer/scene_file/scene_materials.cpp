@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "renderer/scene_file/kind_names.h"
+#include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/image_files.h"
@@ -151,35 +151,35 @@ Material read_material(const std::string& keys) {
 }
 
 TEST(SceneMaterial, EveryKindTakesItsKeys) {
-    EXPECT_EQ(read_material("").kind, Material::Kind::lambert);
+    EXPECT_EQ(read_material("").kind, &kinds::lambert);
     const Material classic = read_material(
         "kind = \"phong_classic\", albedo = 0.9, specular = 0.8, exponent = 3, ambient = [0.1, 0.2, 0.3]");
-    EXPECT_EQ(classic.kind, Material::Kind::phong_classic);
+    EXPECT_EQ(classic.kind, &kinds::phong_classic);
     EXPECT_EQ(classic.diffuse.x + classic.specular.x, 1.7f) << "this form's sum is not bounded";
     EXPECT_EQ(classic.ambient, (Rgb{0.1f, 0.2f, 0.3f}));
     EXPECT_EQ(classic.exponent, 3);
     const Material mirror = read_material("kind = \"mirror\", reflectance = [0.9, 0.8, 0.7]");
-    EXPECT_EQ(mirror.kind, Material::Kind::mirror);
+    EXPECT_EQ(mirror.kind, &kinds::mirror);
     EXPECT_EQ(mirror.specular, (Rgb{0.9f, 0.8f, 0.7f}));
     EXPECT_EQ(read_material("kind = \"mirror\"").specular, (Rgb{1, 1, 1}));
     const Material glass = read_material("kind = \"dielectric\", ior = 1.33, fresnel = \"schlick\"");
-    EXPECT_EQ(glass.kind, Material::Kind::dielectric);
+    EXPECT_EQ(glass.kind, &kinds::dielectric);
     EXPECT_EQ(glass.ior, 1.33f);
     EXPECT_TRUE(glass.schlick);
     EXPECT_FALSE(read_material("kind = \"dielectric\"").schlick);
     const Material foil =
         read_material("kind = \"ggx\", albedo = [0.9, 0.7, 0.3], metallic = 1, roughness = 0.2, ior = 1.6");
-    EXPECT_EQ(foil.kind, Material::Kind::ggx);
+    EXPECT_EQ(foil.kind, &kinds::ggx);
     EXPECT_EQ(foil.diffuse, (Rgb{0.9f, 0.7f, 0.3f}));
     EXPECT_EQ((std::array{foil.metallic, foil.roughness, foil.ior}), (std::array{1.0f, 0.2f, 1.6f}));
     const Material regolith = read_material("kind = \"lommel_seeliger\", albedo = 0.1, asymmetry = -0.3");
-    EXPECT_EQ(regolith.kind, Material::Kind::lommel_seeliger);
+    EXPECT_EQ(regolith.kind, &kinds::lommel_seeliger);
     EXPECT_EQ(regolith.asymmetry, -0.3f);
-    EXPECT_EQ(read_material("kind = \"lunar_lambert\", albedo = 0.12").kind, Material::Kind::lunar_lambert);
+    EXPECT_EQ(read_material("kind = \"lunar_lambert\", albedo = 0.12").kind, &kinds::lunar_lambert);
     const Material hapke = read_material(
         "kind = \"hapke\", albedo = 0.2, b = 0.3, c = 0.1, opposition_b0 = 0.9, opposition_h = 0.07, "
         "roughness_deg = 45");
-    EXPECT_EQ(hapke.kind, Material::Kind::hapke);
+    EXPECT_EQ(hapke.kind, &kinds::hapke);
     EXPECT_EQ(hapke.diffuse.x, 0.2f);
     EXPECT_EQ((std::array{hapke.hapke.phase_b, hapke.hapke.phase_c}), (std::array{0.3f, 0.1f}));
     EXPECT_EQ((std::array{hapke.hapke.opposition_b0, hapke.hapke.opposition_h}), (std::array{0.9f, 0.07f}));
@@ -188,10 +188,10 @@ TEST(SceneMaterial, EveryKindTakesItsKeys) {
 
 TEST(SceneMaterial, DefaultsAreTheStructs) {
     const Material given;
-    for (const auto& [name, kind] : kMaterialKinds) {
+    for (const BsdfKind* kind : bsdf_kinds()) {
+        const std::string_view name = kind->name;
         std::string keys = "kind = \"" + std::string(name) + "\"";
-        if (kind == Material::Kind::phong || kind == Material::Kind::phong_classic)
-            keys += ", specular = 0, exponent = 1";
+        if (kind == &kinds::phong || kind == &kinds::phong_classic) keys += ", specular = 0, exponent = 1";
         const Material m = read_material(keys);
         EXPECT_EQ(m.kind, kind) << name;
         EXPECT_EQ((std::array{m.roughness, m.metallic, m.ior, m.asymmetry, m.normal_scale, m.bump_height_m}),
@@ -286,11 +286,11 @@ TEST(SceneMaterial, MirrorsAndGlassInDirectLightAreTold) {
 TEST(SceneMaterial, ExampleHoldsEveryKindThatPathsHave) {
     const Result<Scene> s = read_scene(data_file("complete.toml"));
     ASSERT_TRUE(s) << s.error().text();
-    for (const auto& [name, kind] : kMaterialKinds) {
-        if (kind == Material::Kind::phong_classic) continue;  // direct light's alone
-        EXPECT_TRUE(std::any_of(s->materials.begin(), s->materials.end(), [kind = kind](const Material& m) {
+    for (const BsdfKind* kind : bsdf_kinds()) {
+        if (kind == &kinds::phong_classic) continue;  // direct light's alone
+        EXPECT_TRUE(std::any_of(s->materials.begin(), s->materials.end(), [kind](const Material& m) {
             return m.kind == kind;
-        })) << name;
+        })) << kind->name;
     }
 }
 

@@ -8,9 +8,6 @@
 #include "emulator/bus/can_node.h"
 
 namespace narpa {
-namespace {
-
-}  // namespace
 
 Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
     const Scene& scene = world.scene();

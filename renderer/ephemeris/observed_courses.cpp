@@ -65,7 +65,8 @@ private:
     [[nodiscard]] Rigid3 pose_at(double t_s) const noexcept {
         const GroundObserver observer = at_start_.after(t_s);
         const Vec3 forward = direction_(observer, t_s), right = cross(forward, observer.zenith());
-        return {camera_attitude(forward, norm(right) > 1e-6 ? normalized(right) : observer.east()),
+        const Vec3 x = norm(right) > 1e-6 ? normalized(right) : observer.east();
+        return {quat_from_columns(x, cross(forward, x), forward),
                 observer.position_m()};
     }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "apps/scene_options.h"
+#include "base/time.h"
 #include "bench/commands/commands.h"
 #include "bench/commands/scene.h"
 #include "bench/lidar_cost.h"

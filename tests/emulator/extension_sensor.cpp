@@ -116,15 +116,17 @@ TEST_F(ExtensionSensor, RunsInLockstepAndReportsOnCan) {
     o.duration_s = 1;
     const auto emulator = open(o);
     ASSERT_TRUE(emulator);
+    StopFlag stop{false};
+    std::thread loop([&] { EXPECT_TRUE(emulator->run(stop)); });
     const auto client = open_or_fail("slcan:" + std::to_string(hub_port(emulator->can()->bus())), CanRole::client);
-    ASSERT_TRUE(client);
-    std::thread loop([&] { EXPECT_TRUE(emulator->run(stop_)); });
-    for (int k = 0; k <= 11; ++k) {
+    for (int k = 0; client && k <= 11; ++k) {
         FrameSet pose;
-        ASSERT_TRUE(encode_classic(command(k), 0x100, pose));
-        for (const CanFrame& frame : pose) ASSERT_TRUE(client->send(frame));
+        EXPECT_TRUE(encode_classic(command(k), 0x100, pose));
+        for (const CanFrame& frame : pose) EXPECT_TRUE(client->send(frame));
     }
+    stop = !client;
     loop.join();
+    ASSERT_TRUE(client);
 
     MessageDecoder<TickReport> decoder;
     std::vector<TickReport> ticks;

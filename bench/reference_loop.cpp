@@ -11,6 +11,7 @@
 
 #include "bench/raw_embree_scene.h"
 #include "renderer/integrator/sampler.h"
+#include "renderer/material/bsdf.h"
 
 namespace narpa {
 namespace {

@@ -30,7 +30,7 @@ double ratio(double a, double b) {
     return b > 0 ? a / b : 0;
 }
 
-json to_json(const ShiftStatistics& s) {
+json shift_document(const ShiftStatistics& s) {
     return {{"pixels", s.count}, {"mean_px", s.mean_px}, {"rms_px", s.rms_px}, {"p99_px", s.p99_px}};
 }
 
@@ -118,7 +118,7 @@ json to_json(const ReplayedFrame& f, const Scene& scene) {
                 {"expected_error", l.expected_error < 0 ? json(nullptr) : json(l.expected_error)},
                 {"predicted_over_measured", predicted ? json(*predicted) : json(nullptr)},
                 {"ssim", d.ssim},
-                {"edges", to_json(d.edges)},
+                {"edges", shift_document(d.edges)},
                 {"bodies", bodies}});
     return out;
 }
@@ -133,7 +133,7 @@ json to_json(const BudgetCost& c) {
         {"predicted_over_measured", c.predicted_over_measured ? json(*c.predicted_over_measured) : json(nullptr)},
         {"ssim_mean", c.ssim_mean},
         {"ssim_least", c.ssim_min},
-        {"edges", to_json(c.edges)},
+        {"edges", shift_document(c.edges)},
         {"bodies",
          {{"centroids", c.bodies},
           {"mean_x_px", c.bodies_x_px},

@@ -8,10 +8,12 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "rehearsal/navigation/estimation/measurements.h"
 #include "rehearsal/navigation/estimation/velocimeter.h"
+#include "rehearsal/navigation/guidance/flight_control.h"
 #include "rehearsal/navigation/guidance/guidance.h"
 
 namespace narpa::rehearsal {

@@ -12,7 +12,7 @@
 #include "protocols/lidar/livox.h"
 #include "protocols/little_endian.h"
 
-namespace narpa {
+namespace narpa::mid360_packets {
 namespace {
 
 constexpr std::size_t kPoints = 96, kBytes = 36 + 96 * 14;
@@ -164,4 +164,4 @@ TEST(Mid360, ShotsFollowOneAnotherAcrossPackets) {
 }
 
 }  // namespace
-}  // namespace narpa
+}  // namespace narpa::mid360_packets

@@ -1,5 +1,6 @@
 // narpa render - renders one frame of one camera, as a run would, to an image file.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -16,6 +17,7 @@
 #include "emulator/log/statistics.h"
 #include "emulator/threads.h"
 #include "renderer/image/image_file.h"
+#include "renderer/integrator/integrator.h"
 
 namespace narpa::cli {
 namespace {
@@ -81,12 +83,12 @@ void keep_only(const std::set<std::string>& names, Aovs& a) {
 }
 
 std::string_view name(Method m) {
-    return m == Method::path ? "path" : "direct";
+    return integrator_kind(m).name;
 }
 
 Outcome render(const RenderOptions& o) {
     std::optional<Method> method;
-    if (!o.method.empty()) method = o.method == "path" ? Method::path : Method::direct;
+    if (!o.method.empty()) method = std::ranges::find(integrator_kinds(), o.method, &IntegratorKind::name)->method;
     auto scene = load_scene(o.scene, method);
     if (!scene) return scene.error();
     auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
@@ -191,8 +193,12 @@ Command add_render(Parser app) {
     c.option("--format", o->format, "GREY, Y16, YUYV, RGB24, RGGB8, RGGB16 ... instead of the scene's")
         .type_name("FORMAT");
     o->budget.add_to(c);
-    c.option("--method", o->method, "direct: light from its sources only; path: all light")
-        .one_of({"direct", "path"});
+    std::vector<std::string> methods, explained;
+    for (const IntegratorKind& kind : integrator_kinds()) {
+        methods.emplace_back(kind.name);
+        explained.push_back(fmt::format("{}: {}", kind.name, kind.help));
+    }
+    c.option("--method", o->method, fmt::format("{}", fmt::join(explained, "; "))).one_of(methods);
     c.option("--max-depth", o->max_depth, "With path: surfaces that a path may hit").range(1, 40);
     c.option("--seed", o->seed, "Seed instead of the scene's");
     c.option("--threads", o->threads, "Threads (default: all cores); the bytes do not depend on it").range(0, 1024);

@@ -42,14 +42,13 @@ struct NamedMechanism {
     const char* name;
     bool Mechanisms::*on;
 };
-inline constexpr std::array<NamedMechanism, 7> kMechanisms{
+inline constexpr std::array<NamedMechanism, 6> kMechanisms{
     {{"sample plan", &Mechanisms::sample_plan},
      {"edge classes", &Mechanisms::edge_classes},
      {"path reuse", &Mechanisms::path_reuse},
      {"small-body sampling", &Mechanisms::small_body_sampling},
      {"separate sun", &Mechanisms::separate_sun},
-     {"tile culling", &Mechanisms::tile_culling},
-     {"coarse steps", &Mechanisms::coarse_steps}}};
+     {"tile culling", &Mechanisms::tile_culling}}};
 
 /// One budget, or one number of samples of the plain loop.
 struct Rung : ErrorRow {

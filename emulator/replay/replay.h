@@ -26,7 +26,7 @@ struct ReferenceComparison {
 /// A logged run of one camera.
 ///
 /// A frame follows from the scene, the bodies' poses, its number, the seed, its step and the sizes of its passes
-/// (renderer/integrator/frame_settings.h). The log has them all, so frames with a time budget repeat too.
+/// (renderer/frame/frame_settings.h). The log has them all, so frames with a time budget repeat too.
 class Replay {
 public:
     /// `camera` empty: the first of the scene. `scene_file` empty: the run's own.

@@ -51,7 +51,7 @@ void PointTracer::trace() {
     if (f_.subpixel_bodies.any())
         for (std::size_t i = 0; i < n_; ++i) p_.hits.put(i, f_.subpixel_bodies.beyond(p_.rays[i], p_.hits[i]));
     RgbLanes radiance;
-    f_.integrator.radiance(f_, p_, radiance);
+    f_.integrator.radiance(f_.transport, p_, radiance);
     for (std::size_t i = 0; i < n_; ++i) {
         RaySample& seen = *seen_[i];
         seen = {sensor_.signal(radiance[i]), -1, kInfinity, {}, {}, p_.rays.direction[i]};

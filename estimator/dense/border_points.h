@@ -8,8 +8,8 @@
 
 #include "estimator/dense/surface_edges.h"
 #include "estimator/view/measured_image.h"
-#include "renderer/frame/camera_batch.h"
 #include "renderer/frame/camera_image.h"
+#include "renderer/frame/camera_rays.h"
 
 namespace narpa {
 
@@ -47,7 +47,7 @@ private:
     const FineGrid& grid_;
     const Frame& f_;
     const SensorModel& sensor_;
-    CameraBatch p_;
+    TracedRays p_;
     std::size_t n_ = 0;
     Lanes<double> x_{}, y_{};
     Lanes<RaySample*> seen_{};

@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "renderer/frame/camera_batch.h"
+#include "renderer/frame/camera_rays.h"
 
 namespace narpa {
 

@@ -1,6 +1,7 @@
 #include "renderer/frame/budgeted_frame.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -12,41 +13,11 @@ using Of = PassCosts::Of;
 using Stage = SamplePlan::Stage;
 using Tiles = FramePasses::Tiles;
 
-/// Samples per pixel that set the footprint for texture filtering. Centres are sampled as in a frame of two
-/// samples, so that each takes its own point of the lens and of the Sun, and shows defocus and penumbrae.
-constexpr int kCentreBeam = 2, kBeamSamples = 4;
-/// Time reserved for waking the threads and for a preempted one: the larger of kMinSlack_ns and 1/kSlackPart of
-/// the budget.
-constexpr std::int64_t kMinSlack_ns = 300'000;
-constexpr std::int64_t kSlackPart = 40;
-/// Fractions of the remaining time for the first pass beyond one sample per pixel, short so that there soon is an
-/// image to show, and for each later pass.
-constexpr double kFirstPart = 1.0 / 3, kNextPart = 0.85;
-/// The same for sunlight samples, whose cost varies more: a pass that is given up loses all of its time.
-constexpr double kSunlightTimePart = 0.7;
-/// Fractions of the remaining rays. With Sun-only direct lighting the number of samples predicts the number of rays
-/// almost exactly; with paths it varies by a tenth from one pass to the next.
-constexpr double kFirstRays = 0.85, kNextRaysOfPaths = 0.9, kNextRays = 0.96;
-/// Largest fraction of the remaining rays that one sample per pixel may be expected to take; the expectation comes
-/// from a sixteenth of the tiles.
-constexpr double kSure = 0.85;
-/// The coarsest image takes two rays for one pixel in 4 x 4, and for those at the edges.
-constexpr std::uint64_t kPixelsOfACoarseRay = 4;
-/// Separate direct sunlight gets samples of its own, with this fraction of the budget, if the budget has this many
-/// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate.
-constexpr double kSunlightPart = 0.22;
-constexpr double kRaysForSunlight = 20, kSamplesForSunlight = 6;
-constexpr double kMostlySeparate = 0.5;
+using namespace tuning;
+
 constexpr double kMaxRaysOfSunlight = 2;  ///< per sample: the camera's and the Sun's
-/// A remainder below this fraction of the budget is not worth another pass.
-constexpr double kRest = 0.05;
 /// Largest pass: what the account can hold, 2^32, less half a sample for each pixel (SamplePlan::whole).
 constexpr double kMaxSamples = 4e9;
-
-/// doubt() lowers an estimate by this factor, to no less than this fraction of the last measurement.
-constexpr double kDoubt = 0.95, kMinBelieved = 0.25;
-/// The time of smaller passes is mostly that of their start and end: an upper bound only.
-constexpr std::uint64_t kMinPieces = 1000;
 
 /// A frame begins with one sample per pixel. Sun-only direct lighting traces the pixel centres, plans from them,
 /// and discards them where there are samples; all other lighting takes the first sample of each pixel's sequence
@@ -62,13 +33,13 @@ public:
           budget_(settings.budget),
           start_ns_(now_ns()),
           slack_ns_(std::max(kMinSlack_ns, (budget_.deadline_ns - start_ns_) / kSlackPart)),
-          centre_settings_(by_direct_light(with_spp(settings, kCentreBeam))),
-          sample_settings_(with_spp(settings, kBeamSamples)),
+          centre_settings_(by_direct_light(with_spp(settings, kCentreFootprint_spp))),
+          sample_settings_(with_spp(settings, kSampleFootprint_spp)),
           centre_(make_frame(render_scene, at, camera, pose, centre_settings_)),
           sample_(make_frame(render_scene, at, camera, pose, sample_settings_)),
           has_indirect_(settings.method == RenderSettings::Method::path),
-          adaptive_(sample_.sun_only && settings.mechanisms.sample_plan),
-          separate_sunlight_(sample_.separate_sun && settings.mechanisms.sample_plan),
+          adaptive_(sample_.parts == LightParts::direct && settings.mechanisms.sample_plan),
+          separate_sunlight_(sample_.parts == LightParts::both && settings.mechanisms.sample_plan),
           out_(out),
           variance_(variance) {}
 
@@ -125,7 +96,7 @@ private:
 
     /// Accounts for a pass; false if it is incomplete and does not count. `instead`: it replaces the previous
     /// passes.
-    bool book(const PassCount& pass, const PassLimit& l, bool instead) {
+    bool account_for(const PassCount& pass, const PassLimit& l, bool instead) {
         if (!pass.complete) {
             // Deterministic: the point at which the threads gave up must not decide what comes next.
             const std::uint64_t lost = budget_.kind == Kind::rays ? l.rays : pass.rays;
@@ -154,8 +125,8 @@ private:
         change_to(centre_);
         const PassCount pass = passes_.centres(centre_, stride, made, l);
         // One pixel in 4 x 4 fills a quarter of a batch, which predicts little of the others' cost.
-        if (stride < 4 || !costs_.known(Of::centres)) costs_.note(Of::centres, pass.samples, pass.wall_ns);
-        if (!book(pass, l, made == 0)) return false;
+        if (stride < 4 || !costs_.known(Of::centres)) costs_.record(Of::centres, pass.samples, pass.wall_ns);
+        if (!account_for(pass, l, made == 0)) return false;
         account_.step = step;
         to_show_ = ToShow::centres;
         stride_ = stride;
@@ -166,11 +137,11 @@ private:
     bool take_first_samples(const PassLimit& l, Tiles which = Tiles::all) {
         change_to(sample_);
         const PassCount pass = passes_.refine(sample_, SamplePlan::none(), SamplePlan::samples_each(1), l, which);
-        if (which == Tiles::all) costs_.note(Of::samples, pass.samples, pass.wall_ns);
-        if (!book(pass, l, which != Tiles::the_others)) return false;
-        each_ = rays_each(pass);
-        mostly_separate_ = static_cast<double>(pass.separate) > kMostlySeparate * static_cast<double>(pass.met);
-        if (which == Tiles::a_sixteenth) return true;
+        if (which == Tiles::all) costs_.record(Of::samples, pass.samples, pass.wall_ns);
+        if (!account_for(pass, l, which != Tiles::all_but_pilot)) return false;
+        rays_each_ = rays_each(pass);
+        mostly_separate_ = static_cast<double>(pass.separate) > kMinSeparate * static_cast<double>(pass.met);
+        if (which == Tiles::pilot) return true;
         account_.step = FrameStep::one_sample;
         to_show_ = ToShow::means;
         stage_ = SamplePlan::samples_each(1);
@@ -185,10 +156,11 @@ private:
         switch (budget_.kind) {
             case Kind::samples: return false;
             case Kind::passes: return budget_.passes[kSunlightPass] > 0;
-            case Kind::rays: return static_cast<double>(budget_.rays) >= kRaysForSunlight * pixels;
+            case Kind::rays: return static_cast<double>(budget_.rays) >= kMinRaysForSunlight * pixels;
             case Kind::time:
                 return costs_.known(Of::samples) && worth_planning() &&
-                       static_cast<double>(costs_.fitting(Of::samples, ns_left())) >= kSamplesForSunlight * pixels;
+                       static_cast<double>(costs_.fitting(Of::samples, ns_left())) >=
+                           kMinSamplesForSunlight * pixels;
         }
         return false;
     }
@@ -197,7 +169,7 @@ private:
         if (!take_centres(1, 0, FrameStep::no_indirect)) return false;
         const std::int64_t start = now_ns();
         passes_.plan_sunlight(centre_);
-        costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
+        costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
         return sunlight_planned_ = true;
     }
     /// Two samples per pixel are needed to estimate the error of paths.
@@ -205,11 +177,12 @@ private:
         const auto pixels = static_cast<double>(passes_.pixels());
         switch (budget_.kind) {
             case Kind::rays:
-                return (each_.sample + each_.path) * pixels <
-                       kFirstRays *
+                return (rays_each_.sample + rays_each_.path) * pixels <
+                       kFirstPassRays *
                            (static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays)));
             case Kind::time:
-                return static_cast<double>(costs_.fitting(Of::samples, ns_for_samples())) * kFirstPart >= pixels;
+                return static_cast<double>(costs_.fitting(Of::samples, ns_for_samples())) * kFirstPassTime >=
+                       pixels;
             default: return true;
         }
     }
@@ -219,25 +192,20 @@ private:
             case Kind::samples: break;
             case Kind::passes: replay_first_image(); break;
             case Kind::time:
-                if (!coarse_steps())
-                    take_one_sample({});
-                else if (!take_if_half_fits(1))
-                    from_coarse_to_fine();
+                if (!take_if_affordable(1)) from_coarse_to_fine();
                 break;
             case Kind::rays:
-                if (!coarse_steps() ||
-                    (adaptive_ && 2 * passes_.pixels() <= rays_left()))  // the camera's and the Sun's
+                if (adaptive_ && 2 * passes_.pixels() <= rays_left())  // the camera's and the Sun's
                     take_one_sample(limit());
-                else if (adaptive_ || !begin_with_a_sixteenth())
+                else if (adaptive_ || !take_pilot_and_rest())
                     from_coarse_to_fine();
                 break;
         }
     }
-    [[nodiscard]] bool coarse_steps() const { return sample_settings_.mechanisms.coarse_steps; }
 
     /// Takes a pass that covers all pixels if it is expected to take at most half of the time left; a quarter of
     /// that time is kept for a coarser pass in case it takes much longer. Stride 1: one sample per pixel.
-    bool take_if_half_fits(int stride) {
+    bool take_if_affordable(int stride) {
         const Of cost = stride == 1 && !adaptive_ ? Of::samples : Of::centres;
         const auto pieces = passes_.pixels() / static_cast<std::uint64_t>(stride * stride);
         const std::int64_t left = ns_left();
@@ -259,25 +227,25 @@ private:
         }
     }
 
-    /// The number of rays per sample is measured on a sixteenth of the tiles; the others follow if they are nearly
-    /// certain to fit. Enough rays are kept for a coarse image in case they do not.
-    bool begin_with_a_sixteenth() {
+    /// A pilot pass over a sixteenth of the tiles measures the number of rays per sample; the other tiles follow if
+    /// they are nearly certain to fit. Enough rays are kept for a coarse image in case they do not.
+    bool take_pilot_and_rest() {
         if (passes_.pixels() > rays_left()) return false;
         PassLimit part = limit();
         part.rays /= 2;
-        if (!take_first_samples(part, Tiles::a_sixteenth)) return false;
+        if (!take_first_samples(part, Tiles::pilot)) return false;
         const std::uint64_t taken = account_.samples;
         PassLimit rest = limit();
-        rest.rays -= std::min(rest.rays, passes_.pixels() / kPixelsOfACoarseRay);
-        if ((each_.sample + each_.path) * static_cast<double>(passes_.pixels() - taken) >
-            kSure * static_cast<double>(rest.rays))
+        rest.rays -= std::min(rest.rays, passes_.pixels() / kPixelsPerCoarseRay);
+        if ((rays_each_.sample + rays_each_.path) * static_cast<double>(passes_.pixels() - taken) >
+            kMaxPilotPrediction * static_cast<double>(rest.rays))
             return false;
-        return take_first_samples(rest, Tiles::the_others);
+        return take_first_samples(rest, Tiles::all_but_pilot);
     }
 
     void from_coarse_to_fine() {
         const bool timed = budget_.kind == Kind::time;
-        if (!timed || !take_if_half_fits(2)) {
+        if (!timed || !take_if_affordable(2)) {
             // A complete coarse frame is taken even if it is late.
             if (!take_centres(4, 0, FrameStep::coarse_4, timed ? PassLimit{} : limit())) return;
             if (!take_centres(2, 4, FrameStep::coarse_2)) return;
@@ -288,7 +256,7 @@ private:
         const std::int64_t left = ns_left();
         if (left <= 0) return;
         if (costs_.known(Of::samples) && costs_.expected_ns(Of::samples, passes_.pixels()) > left)
-            costs_.doubt(Of::samples);
+            costs_.decay(Of::samples);
         else
             take_first_samples(limit());
     }
@@ -298,7 +266,7 @@ private:
         if (adaptive_) {
             const std::int64_t start = now_ns();
             passes_.make_plan(centre_, true);
-            costs_.note(Of::plan, passes_.pixels(), now_ns() - start);
+            costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
             account_.standard_error = passes_.standard_error();
         }
         if (sunlight_planned_) sunlight_planned_ = mostly_separate_ && two_samples_fit();
@@ -306,18 +274,18 @@ private:
         for (std::size_t i = 0; i < passes; ++i) {
             const Stage next = sunlight_planned_ ? SamplePlan::whole(wanted(i)) : wanted(i);
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
-            if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.doubt(Of::samples);
+            if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.decay(Of::samples);
             if (samples == 0) break;
             if (to_show_ == ToShow::means) show();  // an abandoned pass invalidates the means
             const PassLimit l = limit();
             const PassCount pass = passes_.refine(sample_, stage_, next, l);
-            costs_.note(Of::samples, pass.samples, pass.wall_ns);
-            if (!book(pass, l, false)) return;
+            costs_.record(Of::samples, pass.samples, pass.wall_ns);
+            if (!account_for(pass, l, false)) return;
             account_.step = FrameStep::refined;
             account_.passes[i] = static_cast<std::uint32_t>(samples);
             to_show_ = ToShow::means;
             stage_ = next;
-            each_ = rays_each(pass);
+            rays_each_ = rays_each(pass);
         }
         if (sunlight_planned_ && SamplePlan::reaches(stage_, 2)) refine_sunlight();
     }
@@ -332,8 +300,8 @@ private:
         if (to_show_ == ToShow::means) show();
         const PassLimit l = limit();
         const PassCount pass = passes_.refine_sunlight(sample_, each, to, l);
-        costs_.note(Of::sunlight, pass.samples, pass.wall_ns);
-        if (!book(pass, l, false)) return;
+        costs_.record(Of::sunlight, pass.samples, pass.wall_ns);
+        if (!account_for(pass, l, false)) return;
         account_.passes[kSunlightPass] = static_cast<std::uint32_t>(samples);
         to_show_ = ToShow::means;
     }
@@ -341,7 +309,7 @@ private:
         if (budget_.kind == Kind::passes) return budget_.passes[kSunlightPass];
         if (budget_.kind == Kind::rays)
             return std::min(static_cast<double>(rays_left()) / kMaxRaysOfSunlight, kMaxSamples);
-        return std::min(kSunlightTimePart * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())),
+        return std::min(kSunlightPassTime * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())),
                         kMaxSamples);
     }
 
@@ -361,17 +329,17 @@ private:
             return recorded_step() == FrameStep::refined ? plan.reach(stage_, budget_.passes[pass]) : stage_;
         if (budget_.kind == Kind::rays) {
             const double left = static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays));
-            if (left < kRest * static_cast<double>(budget_.rays)) return stage_;
-            const double part = adaptive_ ? kNextRays : pass == 0 ? kFirstRays : kNextRaysOfPaths;
-            return plan.reach(stage_, std::min(part * left, kMaxSamples), each_.sample, each_.path);
+            if (left < kMinRemainder * static_cast<double>(budget_.rays)) return stage_;
+            const double part = adaptive_ ? kNextPassRays : pass == 0 ? kFirstPassRays : kNextPassRaysOfPaths;
+            return plan.reach(stage_, std::min(part * left, kMaxSamples), rays_each_.sample, rays_each_.path);
         }
         if (!worth_a_pass()) return stage_;
         const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_for_samples()));
-        return plan.reach(stage_,
-                          std::min(std::floor((pass == 0 ? kFirstPart : kNextPart) * fitting), kMaxSamples));
+        return plan.reach(
+            stage_, std::min(std::floor((pass == 0 ? kFirstPassTime : kNextPassTime) * fitting), kMaxSamples));
     }
     [[nodiscard]] bool worth_a_pass() const {
-        return static_cast<double>(ns_for_samples()) >= kRest * static_cast<double>(time_given());
+        return static_cast<double>(ns_for_samples()) >= kMinRemainder * static_cast<double>(time_given());
     }
     [[nodiscard]] std::int64_t ns_for_samples() const {
         return ns_left() - static_cast<std::int64_t>(for_sunlight(static_cast<double>(time_given())));
@@ -384,7 +352,7 @@ private:
     /// Planning cannot be interrupted, so it is begun only if time is left for samples.
     [[nodiscard]] bool worth_planning() const {
         if (budget_.kind != Kind::time) return true;
-        const auto rest = static_cast<std::int64_t>(2 * kRest * static_cast<double>(time_given()));
+        const auto rest = static_cast<std::int64_t>(2 * kMinRemainder * static_cast<double>(time_given()));
         return costs_.expected_ns(Of::plan, passes_.pixels()) + rest <= ns_left();
     }
 
@@ -397,7 +365,7 @@ private:
             account_.standard_error = passes_.standard_error();
         }
         to_show_ = ToShow::nothing;
-        costs_.note(Of::show, out_.pixels.size(), now_ns() - start);
+        costs_.record(Of::show, out_.pixels.size(), now_ns() - start);
     }
 
     FramePasses& passes_;
@@ -413,7 +381,7 @@ private:
     FrameAccount account_;
     const Frame* frame_ = nullptr;  ///< the frame whose tiles and G-buffer the passes hold
     std::uint64_t rays_ = 0;        ///< charged to the budget
-    RaysEach each_;                 ///< of the last pass of samples
+    RaysEach rays_each_;            ///< of the last pass of samples
     bool sunlight_planned_ = false, mostly_separate_ = false;
     ToShow to_show_ = ToShow::nothing;
     int stride_ = 1;  ///< of the centres
@@ -421,29 +389,6 @@ private:
 };
 
 }  // namespace
-
-void PassCosts::note(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept {
-    if (pieces == 0) return;
-    double& ns = ns_[index(what)];
-    const double now = static_cast<double>(wall_ns) / static_cast<double>(pieces);
-    if (pieces < kMinPieces && !(known(what) && now < ns)) return;
-    // Limits the weight of an outlier: a delayed frame predicts little of the next.
-    switch (measurements_[index(what)]) {
-        case 0: ns = now; break;
-        case 1: ns = std::min(ns, now); break;
-        default: ns += 0.3 * (std::clamp(now, 0.5 * ns, 2 * ns) - ns);
-    }
-    if (measurements_[index(what)] < 2) ++measurements_[index(what)];
-    min_ns_[index(what)] = kMinBelieved * ns;
-}
-
-void PassCosts::doubt(Of what) noexcept {
-    ns_[index(what)] = std::max(kDoubt * ns_[index(what)], min_ns_[index(what)]);
-}
-
-std::uint64_t PassCosts::fitting(Of what, std::int64_t wall_ns) const noexcept {
-    return static_cast<std::uint64_t>(static_cast<double>(std::max<std::int64_t>(wall_ns, 0)) / ns_[index(what)]);
-}
 
 FrameAccount render_within_budget(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene,
                                   const Camera& camera, const BodyPoses& at, const CameraPose& pose,

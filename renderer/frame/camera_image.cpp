@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 
 #include "base/constants.h"
 #include "renderer/camera/image_optics.h"
 #include "renderer/camera/star_light.h"
 #include "renderer/camera/sun_ghost.h"
 #include "renderer/frame/budgeted_frame.h"
-#include "renderer/frame/camera_batch.h"
+#include "renderer/frame/camera_rays.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"
 
@@ -52,7 +53,7 @@ void store_first_hit(const Frame& f, const Ray& ray, const Hit& hit, std::size_t
 void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
     tbb::parallel_for(0, (height + kTile - 1) / kTile, [&](int row) {
         const FlushDenormals flush;
-        CameraBatch p;
+        TracedRays p;
         CameraSamples s;
         s.centre = true;
         s.sample.fill(0);
@@ -148,6 +149,7 @@ FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose,
 FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose& pose,
                                           const FrameSettings& settings, RadianceImage& final_image, Aovs* aovs,
                                           std::vector<float>* variance, std::span<const std::uint8_t> chosen) {
+    assert(final_image.width == camera.width && final_image.height == camera.height && settings.spp >= 1);
     RadianceImage& out = after_light ? before_optics : final_image;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     FrameAccount account;

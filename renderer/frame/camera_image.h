@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "renderer/camera/camera_pose.h"
+#include "renderer/frame/frame_settings.h"
 #include "renderer/image/radiance_image.h"
-#include "renderer/integrator/frame_settings.h"
 #include "renderer/light/render_scene.h"
 
 namespace narpa {

@@ -4,18 +4,20 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "renderer/frame/tile_worker.h"
+#include "renderer/frame/tuning.h"
 #include "renderer/geometry/flush_denormals.h"
 
 namespace narpa {
 namespace {
 
-/// Tiles per task. Sums are formed per chunk, so that they do not depend on the threads.
-constexpr std::size_t kChunk = 8;
-/// With this many tiles or more, the error of a frame of centres is estimated from a tenth of them.
-constexpr std::size_t kManyTiles = 4096;
+using namespace tuning;
+
+/// Sums are formed per chunk, so that they do not depend on the threads.
+constexpr std::size_t kChunk = kTilesPerTask;
 
 /// The pixel that represents this one.
 int representative(int x, int width, int stride) {
@@ -27,9 +29,9 @@ int representative(int x, int width, int stride) {
 class EmittersInView {
 public:
     EmittersInView(const Frame& f, const Lens* lens) : f_(f) {
-        everywhere_ = !f.sun_only && (f.render_scene.lights().any_with_extent() ||
-                                      !f.render_scene.background().uniform() || f.render_scene.medium() != nullptr);
-        if (f.sun_only || f.path.direct || !f.sun || f.sun->is_point()) return;
+        everywhere_ = f.render_scene.lights().any_with_extent() || !f.render_scene.background().uniform() ||
+                      f.render_scene.medium() != nullptr;
+        if (f.transport.path.direct || !f.sun || f.sun->is_point()) return;
         // Generous upper bounds of the Sun's angular radius and of the deflection of rays by the lens.
         const double disc_rad = f.tracer.scene().sun->angular_diameter_rad;
         const double lens_rad = lens != nullptr ? lens->aperture_diameter_m / lens->focus_distance_m : 0;
@@ -50,11 +52,11 @@ private:
     double within_rad_ = 0;
 };
 
-// Lattices of tiles; the first consists of blocks of 4 x 4 tiles.
-bool in_a_tenth(int tx, int ty) {
+// Lattices of tiles: a tenth of them, in blocks of 4 x 4, and a sixteenth.
+bool is_error_tile(int tx, int ty) {
     return (tx / 4 + 3 * (ty / 4)) % 10 == 0;
 }
-bool in_a_sixteenth(int tx, int ty) {
+bool is_pilot_tile(int tx, int ty) {
     return (tx + 6 * ty) % 16 == 0;
 }
 
@@ -64,7 +66,8 @@ FramePasses::FramePasses(const Tracer& tracer, const Camera& camera)
     : camera_(camera),
       culling_(tracer, camera),
       g_buffer_(camera.width, camera.height),
-      errors_(g_buffer_.tiles() / kChunk + 1),
+      counts_(g_buffer_.tiles() / kChunk + 1),
+      errors_(counts_.size()),
       blank_(g_buffer_.tiles(), 0) {
     tiles_.reserve(g_buffer_.tiles());
 }
@@ -85,7 +88,8 @@ template <class Work>
 PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& limit, Work&& work) {
     const std::int64_t start = now_ns();
     std::atomic<bool> stop{false};
-    std::atomic<std::uint64_t> samples{0}, rays{0}, paths{0}, path_rays{0}, met{0}, separate{0};
+    std::atomic<std::uint64_t> rays{0};
+    std::fill(counts_.begin(), counts_.end(), PassCount{});
     const auto over_chunk = [&](std::size_t chunk, auto&& storage) {
         const std::int64_t chunk_start = f.settings.times ? now_ns() : 0;
         PhaseTimes times{};
@@ -96,12 +100,8 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
             if (stop.load(std::memory_order_relaxed)) break;
             work(w, tile(tiles_[i]));
         }
-        samples.fetch_add(w.samples_traced(), std::memory_order_relaxed);
-        paths.fetch_add(w.paths_traced(), std::memory_order_relaxed);
-        met.fetch_add(w.met(), std::memory_order_relaxed);
-        separate.fetch_add(w.separate(), std::memory_order_relaxed);
-        path_rays.fetch_add(w.rays_traced(&CameraBatch::path_rays), std::memory_order_relaxed);
-        if (rays.fetch_add(w.rays_traced(), std::memory_order_relaxed) + w.rays_traced() > limit.rays)
+        const PassCount& count = counts_[chunk] = w.count();
+        if (rays.fetch_add(count.rays, std::memory_order_relaxed) + count.rays > limit.rays)
             stop.store(true, std::memory_order_relaxed);
         if (sums == Sums::errors) errors_[chunk] = w.error;
         if (!f.settings.times) return;
@@ -116,13 +116,17 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
         [&](const tbb::blocked_range<std::size_t>& one) {
             if (stop.load(std::memory_order_relaxed)) return;
             const FlushDenormals flush;
-            if (f.sun_only)
+            if (f.parts == LightParts::direct)
                 over_chunk(one.begin(), Worker::Storage<1>());
             else
                 over_chunk(one.begin(), Worker::Storage<kMaxBatches>());
         },
         tbb::simple_partitioner());
-    return {!stop, samples, rays, paths, path_rays, met, separate, now_ns() - start};
+    PassCount sum;
+    for (const PassCount& count : counts_) sum += count;
+    sum.complete = !stop;
+    sum.wall_ns = now_ns() - start;
+    return sum;
 }
 
 void FramePasses::begin(const Frame& f, const Lens* lens) {
@@ -146,18 +150,19 @@ void FramePasses::begin(const Frame& f, const Lens* lens) {
 
 /// Radiance of an escaped ray that points away from the Sun.
 void FramePasses::find_background(const Frame& f) {
-    CameraBatch p;
+    TracedRays p;
     RgbLanes radiance;
     p.rays.n = 1;
     p.rays.put(0, {f.T_world_camera.t, f.sun ? -f.sun->centre() : f.T_world_camera.q * Vec3{0, 0, 1}});
     p.hits.met = 0;
     p.hits.body.fill(-1);
     if (f.sun) p.to_sun.fill(f.sun->centre());
-    f.integrator.radiance(f, p, radiance);
+    f.integrator.radiance(f.transport, p, radiance);
     background_ = radiance[0];
 }
 
 void FramePasses::fill_background(RadianceImage& out) {
+    assert(out.width == camera_.width && out.height == camera_.height);
     if (blank_image_ != out.pixels.data() || blank_background_ != background_)
         std::fill(blank_.begin(), blank_.end(), std::uint8_t{0});
     blank_image_ = out.pixels.data();
@@ -179,6 +184,8 @@ void FramePasses::fill_background(RadianceImage& out) {
 
 PassCount FramePasses::uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance,
                                std::span<const std::uint8_t> chosen) {
+    assert(chosen.empty() || (chosen.size() == out.pixels.size() && f.settings.spp > 1));
+    assert(variance == nullptr || variance->size() == out.pixels.size());
     fill_background(out);
     const PassCount count = over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         if (f.one_sample())
@@ -213,7 +220,7 @@ void FramePasses::show_samples(Worker& w, const Tile& t, std::span<const std::ui
     }
     const auto none = [](std::size_t) { return 0u; };
     const auto all = [&](std::size_t at) { return count[at]; };
-    w.samples(t, out.width, none, all, [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
+    w.samples(t, out.width, none, all, [&](const SampleBatch& b, const TracedRays&, const BatchRadiance& light) {
         add_samples(b, light, means);
         if (variance == nullptr) return;
         for_each_lane(b.direct_lanes, [&](std::size_t i) { spread[b.place[i]].add(light.direct[i]); });
@@ -239,17 +246,16 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
     }
     PerPixel<float> r, g, b;
     w.centres(t, out.width, out.height, 1, 0,
-              [&](const SampleBatch& batch, const CameraBatch&, const BatchRadiance& light) {
+              [&](const SampleBatch& batch, const TracedRays&, const BatchRadiance& light) {
                   put_in_tile(w.f, light, batch.place, batch.samples.n, r, g, b);
               });
     put_pixels(t, r, g, b, out);
 }
 
-/// True if the tile is used for the error estimate: all tiles, or a tenth of many. On the craft at 1024 x 1024 this
-/// estimate differs by 3 % from that of all tiles.
+/// True if the tile is used for the error estimate: all tiles, or a tenth of many.
 bool FramePasses::estimates(std::uint32_t tile) const noexcept {
     const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
-    return tiles_.size() < kManyTiles || in_a_tenth(tx, ty);
+    return tiles_.size() < kManyTiles || is_error_tile(tx, ty);
 }
 
 /// The tiles of the error estimate and their neighbours.
@@ -258,7 +264,7 @@ bool FramePasses::fills_g_buffer(std::uint32_t tile) const noexcept {
     const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
     for (int y = ty - 1; y <= ty + 1; ++y)
         for (int x = tx - 1; x <= tx + 1; ++x)
-            if (x >= 0 && y >= 0 && in_a_tenth(x, y)) return true;
+            if (x >= 0 && y >= 0 && is_error_tile(x, y)) return true;
     return false;
 }
 
@@ -274,6 +280,7 @@ void FramePasses::estimate_centres(const Frame& f) {
 }
 
 PassCount FramePasses::centres(const Frame& f, int stride, int made, const PassLimit& limit) {
+    assert(made == 0 || made == 2 * stride);
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         w.centres(t, camera_.width, camera_.height, stride, made, g_buffer_);
     });
@@ -295,18 +302,18 @@ void FramePasses::show_centres(const Frame& f, int stride, RadianceImage& out) {
 void FramePasses::make_plan(const Frame& f, bool adaptive) {
     if (!plan_) plan_.emplace(g_buffer_.tiles());
     if (means_.empty()) means_.resize(g_buffer_.tiles());
-    if (f.separate_sun && !sunlight_plan_) sunlight_plan_.emplace(g_buffer_.tiles());
+    if (f.parts == LightParts::both && !sunlight_plan_) sunlight_plan_.emplace(g_buffer_.tiles());
     if (!adaptive) return plan_->make_uniform(f, tiles_);
-    plan_->weigh(f, g_buffer_, tiles_);
+    plan_->make_adaptive(f, g_buffer_, tiles_);
     over_tiles(f, Sums::errors, {},
                [&](Worker& w, const Tile& t) { w.error.add_centres(plan_->contrast(t.index)); });
 }
 
 PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
                               Tiles which) {
+    assert(plan_ && to.level >= from.level);
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
-        if (which != Tiles::all && in_a_sixteenth(t.x / kTile, t.y / kTile) != (which == Tiles::a_sixteenth))
-            return;
+        if (which != Tiles::all && is_pilot_tile(t.x / kTile, t.y / kTile) != (which == Tiles::pilot)) return;
         const auto begin = [&](std::size_t at) { return plan_->count(t.index, at, from); };
         const auto end = [&](std::size_t at) { return plan_->count(t.index, at, to); };
         PerPixel<PixelMeans>& means = means_[t.index];
@@ -317,7 +324,7 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
         // comes from contrasts.
         const bool fill = plan_->is_uniform() && from == SamplePlan::none();
         w.samples(t, camera_.width, begin, end,
-                  [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& light) {
+                  [&](const SampleBatch& b, const TracedRays& p, const BatchRadiance& light) {
                       add_samples(b, light, means);
                       if (fill) g_buffer_.store(f, p, light, b.place, t.index);
                   });
@@ -326,18 +333,19 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
 
 void FramePasses::plan_sunlight(const Frame& f) {
     if (tiles_.size() < g_buffer_.tiles()) sunlight_plan_->clear();
-    sunlight_plan_->weigh(f, g_buffer_, tiles_);
+    sunlight_plan_->make_adaptive(f, g_buffer_, tiles_);
 }
 
 PassCount FramePasses::refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to,
                                        const PassLimit& limit) {
+    assert(sunlight_plan_ && f.parts == LightParts::both);
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         w.with_paths = false;
         const auto begin = [&](std::size_t) { return each; };
         const auto end = [&](std::size_t at) { return std::max(each, sunlight_plan_->count(t.index, at, to)); };
         PerPixel<PixelMeans>& means = means_[t.index];
         w.samples(t, camera_.width, begin, end,
-                  [&](const SampleBatch& b, const CameraBatch&, const BatchRadiance& light) {
+                  [&](const SampleBatch& b, const TracedRays&, const BatchRadiance& light) {
                       add_samples(b, light, means);
                   });
     });
@@ -345,6 +353,7 @@ PassCount FramePasses::refine_sunlight(const Frame& f, std::uint32_t each, Sampl
 
 void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out,
                              std::vector<float>* variance) {
+    assert(plan_ && (variance == nullptr || variance->size() == out.pixels.size()));
     fill_background(out);
     const bool uniform = plan_->is_uniform();
     const bool needs_contrast = uniform && (variance != nullptr || !SamplePlan::reaches(stage, 2));

@@ -31,6 +31,13 @@ struct PassCount {
     std::uint64_t paths = 0, path_rays = 0;  ///< samples with a path; rays beyond first surfaces
     std::uint64_t met = 0, separate = 0;     ///< samples that hit a surface; those with separate direct sunlight
     std::int64_t wall_ns = 0;
+
+    PassCount& operator+=(const PassCount& b) noexcept {
+        complete = complete && b.complete;
+        samples += b.samples, rays += b.rays, paths += b.paths, path_rays += b.path_rays;
+        met += b.met, separate += b.separate, wall_ns += b.wall_ns;
+        return *this;
+    }
 };
 
 class FramePasses {
@@ -49,8 +56,8 @@ public:
     PassCount uniform(const Frame& f, RadianceImage& out, std::vector<float>* variance,
                       std::span<const std::uint8_t> chosen = {});
 
-    /// Tiles that a pass covers; the sixteenth is evenly spread.
-    enum class Tiles : std::uint8_t { all, a_sixteenth, the_others };
+    /// Tiles that a pass covers; those of the pilot pass are a sixteenth, evenly spread.
+    enum class Tiles : std::uint8_t { all, pilot, all_but_pilot };
     /// Traces the centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, except those of an
     /// earlier pass of stride `made` (0: none).
     PassCount centres(const Frame& f, int stride, int made, const PassLimit& limit);
@@ -102,6 +109,7 @@ private:
     std::vector<std::uint32_t> tiles_;  ///< that may show something
     std::uint64_t pixels_ = 0;
     Rgb background_{};                ///< radiance of the other tiles
+    std::vector<PassCount> counts_;   ///< of each chunk of tiles in the last pass
     std::vector<FrameError> errors_;  ///< of each chunk of tiles
 
     std::optional<SamplePlan> plan_, sunlight_plan_;  ///< allocated when first needed, as is means_

@@ -62,7 +62,7 @@ struct alignas(64) LaneSurfaces {
     Lanes<std::uint32_t> surface;
 };
 
-NARPA_EACH_ISA void store_surfaces(const CameraBatch& p, const Vec3& axis, std::uint32_t lit,
+NARPA_EACH_ISA void store_surfaces(const TracedRays& p, const Vec3& axis, std::uint32_t lit,
                                    LaneSurfaces& out) noexcept {
     const Lanes<int> shone = masks_of(lit), met = masks_of(p.hits.met);
     LaneSurfaces seen;
@@ -84,27 +84,27 @@ NARPA_EACH_ISA void store_surfaces(const CameraBatch& p, const Vec3& axis, std::
 
 }  // namespace
 
-bool GBuffer::shows_background(const Frame& f, const CameraBatch& p, const BatchRadiance& light) const noexcept {
+bool GBuffer::shows_background(const Frame& f, const TracedRays& p, const BatchRadiance& light) const noexcept {
     if (p.hits.met != 0) return false;
     for (std::size_t i = 0; i < p.rays.n; ++i)
-        if (light(f, i) != background_) return false;
+        if (light.total(f.parts, i) != background_) return false;
     return true;
 }
 
-void GBuffer::store(const Frame& f, const CameraBatch& p, const BatchRadiance& light,
+void GBuffer::store(const Frame& f, const TracedRays& p, const BatchRadiance& light,
                     const Lanes<std::uint8_t>& place, std::size_t tile_index) noexcept {
     GBufferTile& tile = tiles_[tile_index];
     if (!shows_background(f, p, light)) known_[tile_index] = Known::something;
     LaneSurfaces seen;
     if (p.hits.met != 0)
-        store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.sun_only ? p.lit : 0, seen);
+        store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.parts == LightParts::direct ? p.lit : 0, seen);
     else
         seen = {};
     const auto put = [&](const auto& from, auto& to) { put_in_tile(from, place, p.rays.n, to); };
     put_in_tile(f, light, place, p.rays.n, tile.r, tile.g, tile.b);
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
-    if (!f.sun_only) put(p.variance, tile.reused);
+    if (f.parts != LightParts::direct) put(p.variance, tile.reused);
 }
 
 namespace {
@@ -309,7 +309,7 @@ void GBuffer::contrast(const Frame& f, std::size_t tile, TileContrast& out) cons
     gather(f, tile, a);
     measure_contrasts(a, out);
     out.reused.fill(0);
-    if (!f.sun_only && !f.path.direct)
+    if (!f.transport.path.direct)
         for (std::size_t i = 0; i < kTilePixels; ++i) {
             if (tiles_[tile].surface[i] != 0) out.reused[i] = tiles_[tile].reused[i];
             out.centre[i] += out.reused[i];

@@ -23,12 +23,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "renderer/frame/frame.h"
 #include "renderer/frame/tile_culling.h"
-#include "renderer/integrator/integrator.h"
 
 namespace narpa {
 
@@ -54,9 +55,11 @@ void put_in_tile(const Lanes<T>& from, const Lanes<std::uint8_t>& place, std::si
 inline void put_in_tile(const Frame& f, const BatchRadiance& light, const Lanes<std::uint8_t>& place, std::size_t n,
                         PerPixel<float>& r, PerPixel<float>& g, PerPixel<float>& b) noexcept {
     RgbLanes whole;
-    if (!f.sun_only)
-        for (std::size_t i = 0; i < n; ++i) whole.put(i, light(f, i));
-    const RgbLanes& rgb = f.sun_only ? light.direct : whole;
+    if (f.parts == LightParts::both)
+        for (std::size_t i = 0; i < n; ++i) whole.put(i, light.total(f.parts, i));
+    const RgbLanes& rgb = f.parts == LightParts::both     ? whole
+                          : f.parts == LightParts::direct ? light.direct
+                                                          : light.path;
     put_in_tile(rgb.r, place, n, r), put_in_tile(rgb.g, place, n, g), put_in_tile(rgb.b, place, n, b);
 }
 
@@ -92,8 +95,14 @@ public:
     [[nodiscard]] int tiles_x() const noexcept { return tiles_x_; }
     [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
     [[nodiscard]] std::size_t tiles() const noexcept { return tiles_.size(); }
-    [[nodiscard]] GBufferTile& tile(std::size_t i) noexcept { return tiles_[i]; }
-    [[nodiscard]] const GBufferTile& tile(std::size_t i) const noexcept { return tiles_[i]; }
+    [[nodiscard]] GBufferTile& tile(std::size_t i) noexcept {
+        assert(i < tiles_.size());
+        return tiles_[i];
+    }
+    [[nodiscard]] const GBufferTile& tile(std::size_t i) const noexcept {
+        assert(i < tiles_.size());
+        return tiles_[i];
+    }
 
     /// Starts a frame in which no tile is traced yet; untraced tiles show this background.
     void begin_frame(const Rgb& background);
@@ -101,7 +110,7 @@ public:
     [[nodiscard]] bool is_traced(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
 
     /// Stores one sample of each of a batch's pixels. `place`: index of each lane's pixel in the tile.
-    void store(const Frame& f, const CameraBatch& p, const BatchRadiance& light, const Lanes<std::uint8_t>& place,
+    void store(const Frame& f, const TracedRays& p, const BatchRadiance& light, const Lanes<std::uint8_t>& place,
                std::size_t tile) noexcept;
 
     /// Computes contrasts from a tile and its neighbours.
@@ -112,7 +121,7 @@ public:
 
 private:
     void gather(const Frame& f, std::size_t tile, Around& a) const noexcept;
-    [[nodiscard]] bool shows_background(const Frame& f, const CameraBatch& p,
+    [[nodiscard]] bool shows_background(const Frame& f, const TracedRays& p,
                                         const BatchRadiance& light) const noexcept;
     [[nodiscard]] bool in_empty_space(std::size_t tile) const noexcept;
 

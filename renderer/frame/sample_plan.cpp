@@ -6,25 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "renderer/frame/tuning.h"
 #include "renderer/integrator/sampler.h"
 
 namespace narpa {
 namespace {
 
-/// Edges move by less than a pixel, and centres often miss thin parts: pixels next to an edge get the fraction
-/// kBeside of its variance, the next ones kNextButOne.
-constexpr float kBeside = 0.05f, kNextButOne = 0.01f;
-/// Smallest weight of a pixel that differs from its neighbours, relative to a typical edge's. Pixels in completely
-/// uniform regions, such as empty space, get an eighth of it (kMinNonUniformWeight).
-constexpr double kMin = 1.0 / 128;
-/// A pixel whose centre hit nothing gets kMin times two to this power: a body's bounds are in view, so thin parts
-/// may pass between the centres, and a search costs one ray and no shading.
-constexpr int kEmptyDoublings = 2;
-/// An edge of little contrast may hide a glint that no centre met: this fraction of a typical variance is assumed.
-constexpr float kUnseen = 0.02f;
-/// Exponent of the variance of edges, which falls as n^-1.5, beside that of noise, which falls as 1/n: the weights
-/// are the powers 2/5 and 1/2 of the variances of one sample.
-constexpr double kEdgePower = 0.8;
+using namespace tuning;
 
 constexpr int kRim = 2;
 constexpr int kPlanSide = kTile + 2 * kRim;
@@ -66,7 +54,7 @@ Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& c
 }
 
 /// Variance of one sample of each pixel, relative to a typical one; 0 if its surroundings are uniform.
-PerPixel<double> variances_of(const Neighbourhood& n, double typical, bool edge_classes) {
+PerPixel<double> relative_variances(const Neighbourhood& n, double typical, bool edge_classes) {
     PlanGrid near{}, far{}, noises{}, knowns{};  // folded along the rows, then along the columns
     for (int y = 0; y < kPlanSide; ++y)
         for (int x = kRim; x < kPlanSide - kRim; ++x) {
@@ -87,8 +75,8 @@ PerPixel<double> variances_of(const Neighbourhood& n, double typical, bool edge_
             };
             float edge = n.edge[y][x];
             if (edge_classes)
-                edge = std::max({edge, kBeside * fold(1, column(near), kGreatest),
-                                 kNextButOne * fold(2, column(far), kGreatest)});
+                edge = std::max({edge, kVarianceBesideEdge * fold(1, column(near), kGreatest),
+                                 kVarianceTwoFromEdge * fold(2, column(far), kGreatest)});
             const float neighbours = fold(2, column(knowns), kSum) - cross(n.known);
             const float noise =
                 neighbours > 0 ? std::max(fold(2, column(noises), kSum) - cross(n.noise), 0.0f) / neighbours : 0.0f;
@@ -117,7 +105,7 @@ int rank_of(int tx, int ty) {
 
 SamplePlan::SamplePlan(std::size_t tiles) : contrasts_(tiles), weights_(tiles), sums_(tiles), ranks_(tiles) {}
 
-void SamplePlan::weigh(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
+void SamplePlan::make_adaptive(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
     uniform_ = false;
     over_tiles(tiles, [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) contrast_tile(f, g_buffer, tiles[i]);
@@ -132,7 +120,7 @@ void SamplePlan::weigh(const Frame& f, const GBuffer& g_buffer, std::span<const 
     over_tiles(tiles, [&](const auto& range) {
         Histogram histogram{};
         for (std::size_t i = range.begin(); i != range.end(); ++i)
-            weigh_tile(f, g_buffer, tiles[i], typical * typical, histogram);
+            set_weights(f, g_buffer, tiles[i], typical * typical, histogram);
         for (std::size_t w = 0; w < histogram.size(); ++w)
             if (histogram[w] > 0) histogram_[w].fetch_add(histogram[w], std::memory_order_relaxed);
     });
@@ -154,12 +142,12 @@ void SamplePlan::contrast_tile(const Frame& f, const GBuffer& g_buffer, std::siz
     sums_[tile] = sums;
 }
 
-void SamplePlan::weigh_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile, double typical_variance,
-                            Histogram& histogram) noexcept {
+void SamplePlan::set_weights(const Frame& f, const GBuffer& g_buffer, std::size_t tile, double typical_variance,
+                             Histogram& histogram) noexcept {
     const int tx = static_cast<int>(tile) % g_buffer.tiles_x(), ty = static_cast<int>(tile) / g_buffer.tiles_x();
-    const float unseen = kUnseen / 12 * static_cast<float>(typical_variance);
-    const PerPixel<double> variances = variances_of(gather(g_buffer, contrasts_, tx, ty, unseen), typical_variance,
-                                                    f.settings.mechanisms.edge_classes);
+    const float unseen = kHiddenVariance / 12 * static_cast<float>(typical_variance);
+    const PerPixel<double> variances = relative_variances(gather(g_buffer, contrasts_, tx, ty, unseen),
+                                                          typical_variance, f.settings.mechanisms.edge_classes);
     for (int y = 0; y < kTile; ++y)
         for (int x = 0; x < kTile; ++x) {
             const std::size_t place = place_in_tile(x, y);
@@ -167,7 +155,7 @@ void SamplePlan::weigh_tile(const Frame& f, const GBuffer& g_buffer, std::size_t
             out = -1;
             if (tx * kTile + x >= g_buffer.width() || ty * kTile + y >= g_buffer.height()) continue;
             const double variance = variances[place];
-            const double doublings = std::log2(std::max(std::sqrt(variance), kMin) / kMin);
+            const double doublings = std::log2(std::max(std::sqrt(variance), kMinWeight) / kMinWeight);
             const int of_variance =
                 variance > 0 ? kMinNonUniformWeight + static_cast<int>(kPerDoubling * doublings) : 0;
             const bool empty = g_buffer.tile(tile).surface[place] == 0;
@@ -182,7 +170,7 @@ void SamplePlan::weigh_tile(const Frame& f, const GBuffer& g_buffer, std::size_t
 void SamplePlan::make_uniform(const Frame& f, std::span<const std::uint32_t> tiles) {
     const int width = f.camera.width, height = f.camera.height;
     uniform_ = true;
-    all_by_paths_ = !f.separate_sun;
+    all_by_paths_ = f.parts != LightParts::both;
     pixels_of_rank_.fill(0);
     const int tiles_x = (width + kTile - 1) / kTile;
     for (const std::uint32_t tile : tiles) {

@@ -21,6 +21,7 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <cassert>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -37,9 +38,10 @@ public:
 
     explicit SamplePlan(std::size_t tiles);
 
-    /// Adaptive: weighs the pixels of these tiles by the G-buffer, in parallel. No pixel has samples yet.
-    void weigh(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles);
-    /// Resets all pixels to no samples; later calls of `weigh` set those of their tiles.
+    /// Adaptive: sets the weights of the pixels of these tiles by the G-buffer, in parallel. No pixel has samples
+    /// yet.
+    void make_adaptive(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles);
+    /// Resets all pixels to no samples; later calls of `make_adaptive` set those of their tiles.
     void clear() noexcept;
     /// Uniform, over these tiles of the frame's image.
     void make_uniform(const Frame& f, std::span<const std::uint32_t> tiles);
@@ -59,6 +61,7 @@ public:
     }
 
     [[nodiscard]] std::uint32_t count(std::size_t tile, std::size_t place, Stage stage) const noexcept {
+        assert(tile < ranks_.size() && place < kTilePixels);
         return uniform_ ? of_rank(ranks_[tile], stage) : count(weights_[tile][place], stage);
     }
     /// Samples of all pixels.
@@ -104,8 +107,8 @@ private:
     }
     void contrast_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile) noexcept;
     using Histogram = std::array<std::uint32_t, kWeights>;  ///< pixels of each weight
-    void weigh_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile, double typical_variance,
-                    Histogram& histogram) noexcept;
+    void set_weights(const Frame& f, const GBuffer& g_buffer, std::size_t tile, double typical_variance,
+                     Histogram& histogram) noexcept;
 
     bool uniform_ = false;
     bool all_by_paths_ = false;  ///< uniform: every sample has a path; else as paths_of()

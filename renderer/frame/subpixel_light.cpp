@@ -70,7 +70,7 @@ double pixel_share(bool spread, double distance_px) {
 class Collector {
 public:
     Collector(const Frame& f, const PixelBlock& block)
-        : f_(f), block_(block), pixel_angle_rad_(f.path.pixel_angle_rad) {}
+        : f_(f), block_(block), pixel_angle_rad_(f.transport.path.pixel_angle_rad) {}
 
     void sample(const SubpixelDisc& disc);
     void put_into(RadianceImage& out, std::vector<float>* variance) const;
@@ -84,7 +84,7 @@ private:
     Frame f_;  ///< with the footprint of a body's samples
     const PixelBlock& block_;
     double pixel_angle_rad_;
-    CameraBatch batch_;
+    TracedRays batch_;
     Lanes<Lanes<double>> columns_{}, rows_{};  ///< of each ray: shares of the block's columns and rows
     Lanes<double> area_px2_{};                 ///< area of the image that each ray represents
     Lanes<Vec3> light_{};                      ///< of each pixel
@@ -97,7 +97,8 @@ void Collector::sample(const SubpixelDisc& disc) {
     body_squares_.fill(0);
     const std::uint32_t samples = samples_of(disc, f_.settings.spp);
     const double area_m2 = std::numbers::pi * norm(cross(disc.right, disc.up));
-    f_.path.pixel_angle_rad = std::min(pixel_angle_rad_, std::sqrt(area_m2 / samples) / norm(disc.centre));
+    f_.transport.path.pixel_angle_rad =
+        std::min(pixel_angle_rad_, std::sqrt(area_m2 / samples) / norm(disc.centre));
     for (std::uint32_t s = 0; s < samples; ++s) {
         add(disc, s, samples);
         if (batch_.rays.n == kLanes) trace(disc.body);
@@ -151,7 +152,7 @@ void Collector::trace(std::size_t body) {
     for (std::size_t i = 0; i < batch_.rays.n; ++i)
         if (batch_.hits.body[i] != static_cast<int>(body)) batch_.hits.put(i, {});
     RgbLanes radiance;
-    f_.integrator.radiance(f_, batch_, radiance);
+    f_.integrator.radiance(f_.transport, batch_, radiance);
     for (std::size_t i = 0; i < batch_.rays.n; ++i) {
         if (batch_.hits.body[i] < 0) continue;
         for (std::size_t pixel = 0; pixel < block_.n; ++pixel) {

@@ -1,8 +1,8 @@
 /// renderer/frame/subpixel_light.h - adds the light of subpixel bodies to the image.
 #pragma once
 
+#include "renderer/frame/frame.h"
 #include "renderer/image/radiance_image.h"
-#include "renderer/integrator/integrator.h"
 
 namespace narpa {
 

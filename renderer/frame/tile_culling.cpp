@@ -1,8 +1,9 @@
 #include "renderer/frame/tile_culling.h"
 
 #include <algorithm>
+#include <cassert>
 
-#include "renderer/integrator/subpixel_bodies.h"
+#include "renderer/frame/subpixel_bodies.h"
 
 namespace narpa {
 
@@ -53,6 +54,7 @@ void TileCulling::list(std::uint32_t body) noexcept {
 }
 
 std::span<const std::uint32_t> TileCulling::bodies(int tile_x, int tile_y) const noexcept {
+    assert(tile_x >= 0 && tile_x < tiles_x_ && tile_y >= 0 && tile_y < tiles_y_);
     const std::size_t tile = index(tile_x, tile_y), n = listed_[tile];
     if (n > max_listed_) return tracer_.all_bodies();
     return std::span(lists_).subspan(max_listed_ * tile, n);

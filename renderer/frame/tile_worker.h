@@ -1,22 +1,22 @@
-/// renderer/frame/tile_worker.h - traces and shades a tile's samples: gathers them into ray batches, traces them,
-/// shades several batches together and passes them to a sink. Used only by frame_passes.cpp.
+/// renderer/frame/tile_worker.h - traces and shades a tile's samples: Worker::trace shows the whole way from pixels
+/// to accumulated samples. Used only by frame_passes.cpp.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <bit>
+#include <cassert>
 #include <cstdint>
 #include <cstring>
 #include <span>
 
-#include "renderer/frame/camera_batch.h"
+#include "renderer/frame/camera_rays.h"
 #include "renderer/frame/frame_passes.h"
 #include "renderer/frame/subpixel_light.h"
+#include "renderer/frame/tuning.h"
 
 namespace narpa {
 
-/// Batches between two clock reads.
-inline constexpr std::uint32_t kBatchesPerClockRead = 16;
 /// First random sequence of centres in frames that add samples; distinct from those of the pixels, because the
 /// centres decide how many samples a pixel gets.
 inline constexpr std::uint32_t kFirstCentre = 0x40000000u;
@@ -50,6 +50,14 @@ struct SampleBatch {
     Lanes<std::uint8_t> place;  ///< index of each sample's pixel in the tile
     std::uint32_t direct_lanes = 0,
                   path_lanes = 0;  ///< the lanes that count for this part of the light (BatchRadiance)
+
+    void add(int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample) {
+        assert(samples.n < kLanes && at < kTilePixels);
+        const std::size_t i = samples.n++;
+        samples.x[i] = x, samples.y[i] = y;
+        samples.number[i] = number, samples.sample[i] = sample;
+        place[i] = static_cast<std::uint8_t>(at);
+    }
 };
 
 /// Per-task state for several tiles; large.
@@ -58,7 +66,7 @@ public:
     /// Memory for batches that are shaded together.
     template <std::size_t N>
     struct Storage {
-        std::array<CameraBatch, N> traced;
+        std::array<TracedRays, N> traced;
         std::array<SampleBatch, N> batches;
     };
 
@@ -66,20 +74,17 @@ public:
     Worker(const Frame& frame, const PassLimit& limit, std::atomic<bool>& stop, PhaseTimes* times,
            Storage<N>& storage)
         : f(frame), until_ns_(limit.until_ns), stop_(stop), traced_(storage.traced), batches_(storage.batches) {
-        for (CameraBatch& p : traced_) p.times = times;
+        for (TracedRays& p : traced_) p.times = times;
     }
 
     const Frame& f;
     FrameError error;
     bool with_paths = true;  ///< false: only the direct part of a frame in two parts (BatchRadiance)
 
-    [[nodiscard]] std::uint64_t samples_traced() const { return samples_; }
-    [[nodiscard]] std::uint64_t paths_traced() const { return paths_; }
-    [[nodiscard]] std::uint64_t met() const { return met_; }
-    [[nodiscard]] std::uint64_t separate() const { return separate_; }
-    [[nodiscard]] std::uint64_t rays_traced(std::uint64_t CameraBatch::*of = &CameraBatch::rays_traced) const {
-        std::uint64_t sum = 0;
-        for (const CameraBatch& p : traced_) sum += p.*of;
+    /// Of all samples so far.
+    [[nodiscard]] PassCount count() const {
+        PassCount sum = count_;
+        for (const TracedRays& p : traced_) sum.rays += p.rays_traced, sum.path_rays += p.path_rays;
         return sum;
     }
     void read_clock() {
@@ -89,51 +94,51 @@ public:
 
     /// Traces samples `begin(at)` to `end(at)` - 1 of each pixel's sequence; `at`: the pixel's index in the tile.
     /// Paths are traced together for up to kMaxPixelSamples samples per pixel, so that neighbours can reuse them.
-    /// Calls `sink(batch, batch, light)` for the samples in order.
-    template <class Begin, class End, class Sink>
-    void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Sink&& sink) {
-        set_centres(false);
-        const std::uint32_t most = f.sun_only || !with_paths ? PixelRange::kAll : kMaxPixelSamples;
+    /// Calls `accumulate(batch, rays, light)` for the samples in order.
+    template <class Begin, class End, class Accumulate>
+    void samples(const Tile& tile, int image_width, Begin&& begin, End&& end, Accumulate&& accumulate) {
+        const bool has_paths = f.parts != LightParts::direct && with_paths;
+        const std::uint32_t most = has_paths ? kMaxPixelSamples : PixelRange::kAll;
         bool left = true;
         for (std::uint32_t done = 0; left; done += most) {
             left = false;
-            tile.each_pixel([&](int x, int y, std::size_t at) {
-                const PixelRange range{begin(at), end(at)};
-                const auto number = static_cast<std::uint32_t>(y * image_width + x);
-                left = left || range.size() > done + most;
-                for (std::uint32_t s = range.from(done); s < range.from(done + most); ++s)
-                    add(tile, x, y, at, number, s, sink);
-            });
-            finish(tile, sink);
+            const auto place = [&](auto&& add, auto&&) {
+                tile.each_pixel([&](int x, int y, std::size_t at) {
+                    const PixelRange range{begin(at), end(at)};
+                    const auto number = static_cast<std::uint32_t>(y * image_width + x);
+                    left = left || range.size() > done + most;
+                    for (std::uint32_t s = range.from(done); s < range.from(done + most); ++s)
+                        add(x, y, at, number, s);
+                });
+            };
+            trace(tile, false, place, accumulate);
         }
     }
 
     /// Traces the centres of the pixels that represent squares of `stride` pixels, except those of an earlier pass
     /// of stride `made` (0: none).
-    template <class Sink>
-    void centres(const Tile& tile, int width, int height, int stride, int made, Sink&& sink) {
-        set_centres(true);
+    template <class Accumulate>
+    void centres(const Tile& tile, int width, int height, int stride, int made, Accumulate&& accumulate) {
+        assert(stride == 1 || stride == 2 || stride == 4);
         const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstCentre;
-        if (stride == 1 && made == 0 && tile.whole()) {
-            for (int block = 0; block < 4; ++block) {
-                put_block(tile, block, first, width, batches_[full_]);
-                trace(tile);
-                if (full_ == traced_.size()) light(sink);
+        const auto place = [&](auto&& add, auto&& add_block) {
+            if (stride == 1 && made == 0 && tile.whole()) {
+                for (int block = 0; block < 4; ++block)
+                    add_block([&](SampleBatch& b) { put_block(tile, block, first, width, b); });
+                return;
             }
-            light(sink);
-            return;
-        }
-        tile.each_pixel([&](int x, int y, std::size_t at) {
-            if (!represents(x, width, stride) || !represents(y, height, stride)) return;
-            if (made > 0 && represents(x, width, made) && represents(y, height, made)) return;
-            add(tile, x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0, sink);
-        });
-        finish(tile, sink);
+            tile.each_pixel([&](int x, int y, std::size_t at) {
+                if (!represents(x, width, stride) || !represents(y, height, stride)) return;
+                if (made > 0 && represents(x, width, made) && represents(y, height, made)) return;
+                add(x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0);
+            });
+        };
+        trace(tile, true, place, accumulate);
     }
     /// The same, stored in the G-buffer.
     void centres(const Tile& tile, int width, int height, int stride, int made, GBuffer& g_buffer) {
         centres(tile, width, height, stride, made,
-                [&](const SampleBatch& b, const CameraBatch& p, const BatchRadiance& l) {
+                [&](const SampleBatch& b, const TracedRays& p, const BatchRadiance& l) {
                     g_buffer.store(f, p, l, b.place, tile.index);
                 });
     }
@@ -146,58 +151,67 @@ private:
         [[nodiscard]] std::uint32_t size() const { return end - begin; }
         [[nodiscard]] std::uint32_t from(std::uint32_t n) const { return begin + std::min(n, size()); }
     };
-    template <class Sink>
-    void add(const Tile& tile, int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample,
-             Sink&& sink) {
-        SampleBatch& b = batches_[full_];
-        const std::size_t i = b.samples.n++;
-        b.samples.x[i] = x, b.samples.y[i] = y;
-        b.samples.number[i] = number, b.samples.sample[i] = sample;
-        b.place[i] = static_cast<std::uint8_t>(at);
-        if (b.samples.n < kLanes) return;
-        trace(tile);
-        if (full_ == traced_.size()) light(sink);
+
+    /// The way of all light of an image: from pixels to rays, first hits, radiance, and to the pixels' sums.
+    ///
+    /// Sixteen samples make a batch of rays; several batches are shaded together. What the samples are is decided
+    /// by `place(add, add_block)`, what becomes of their radiance by `accumulate`.
+    template <class Place, class Accumulate>
+    void trace(const Tile& tile, bool centre, Place&& place, Accumulate&& accumulate) {
+        const auto shade = [&] {
+            std::array<BatchRadiance, kMaxBatches> light;
+            if (full_ > 0) f.integrator.radiance(f.transport, traced_.first(full_), light);  // radiance
+            for (std::size_t k = 0; k < full_; ++k) {
+                accumulate(batches_[k], traced_[k], light[k]);  // accumulated samples
+                count_batch(batches_[k], traced_[k]);
+                batches_[k].samples.n = 0;
+            }
+            full_ = 0;
+        };
+        const auto trace_batch = [&] {
+            SampleBatch& b = batches_[full_];
+            if (stop_.load(std::memory_order_relaxed)) b.samples.n = 0;
+            if (b.samples.n == 0) return;
+            TracedRays& p = traced_[full_++];
+            b.samples.centre = centre;
+            aim_rays(f, b.samples, p);  // rays
+            find_first_hits(f, tile.bodies, p);
+            choose_parts(b, p);
+            if (full_ == traced_.size()) shade();
+        };
+        place(
+            [&](int x, int y, std::size_t at, std::uint32_t number, std::uint32_t sample) {  // pixels
+                batches_[full_].add(x, y, at, number, sample);
+                if (batches_[full_].samples.n == kLanes) trace_batch();
+            },
+            [&](auto&& put) {
+                put(batches_[full_]);
+                trace_batch();
+            });
+        trace_batch();
+        shade();
     }
-    void trace(const Tile& tile) {
-        SampleBatch& b = batches_[full_];
-        if (stop_.load(std::memory_order_relaxed)) b.samples.n = 0;
-        if (b.samples.n == 0) return;
-        CameraBatch& p = traced_[full_++];
-        trace_rays(f, b.samples, tile.bodies, p);
+
+    /// The lanes that count for each part of the light.
+    void choose_parts(SampleBatch& b, TracedRays& p) const {
         const std::uint32_t all = lanes_below(b.samples.n);
-        b.direct_lanes = f.sun_only || f.separate_sun ? all : 0;
-        b.path_lanes = f.sun_only || !with_paths ? 0 : all;
-        if (f.separate_sun && with_paths)
+        b.direct_lanes = f.parts == LightParts::path ? 0 : all;
+        b.path_lanes = f.parts == LightParts::direct || !with_paths ? 0 : all;
+        if (f.parts == LightParts::both && with_paths)
             for_each_lane(all, [&](std::size_t i) {
                 if (!has_path(b.samples.sample[i])) b.path_lanes &= ~(1u << i);
                 p.sample[i] = paths_of(b.samples.sample[i]);
             });
         p.path_lanes = b.path_lanes;
     }
-    template <class Sink>
-    void light(Sink&& sink) {
-        std::array<BatchRadiance, kMaxBatches> lights;
-        if (full_ > 0) f.integrator.radiance(f, traced_.first(full_), lights);
-        for (std::size_t k = 0; k < full_; ++k) {
-            sink(batches_[k], traced_[k], lights[k]);
-            samples_ += batches_[k].samples.n;
-            if (f.separate_sun) {
-                met_ += static_cast<std::uint64_t>(std::popcount(traced_[k].hits.met));
-                separate_ += static_cast<std::uint64_t>(std::popcount(traced_[k].first.lanes));
-            }
-            if (!f.sun_only) paths_ += static_cast<std::uint64_t>(std::popcount(batches_[k].path_lanes));
-            batches_[k].samples.n = 0;
-            if (++lit_ % kBatchesPerClockRead == 0) read_clock();
+    void count_batch(const SampleBatch& b, const TracedRays& p) {
+        count_.samples += b.samples.n;
+        count_.paths += static_cast<std::uint64_t>(std::popcount(b.path_lanes));
+        if (f.parts == LightParts::both) {
+            count_.met += static_cast<std::uint64_t>(std::popcount(p.hits.met));
+            count_.separate += static_cast<std::uint64_t>(std::popcount(p.first.lanes));
         }
-        full_ = 0;
-    }
-    template <class Sink>
-    void finish(const Tile& tile, Sink&& sink) {
-        trace(tile);
-        light(sink);
-    }
-    void set_centres(bool centres) {
-        for (SampleBatch& b : batches_) b.samples.centre = centres;
+        if (++shaded_ % tuning::kBatchesPerClockRead == 0) read_clock();
     }
     /// The centres of 4 x 4 pixels, a whole batch.
     static void put_block(const Tile& tile, int block, std::uint32_t first, int width, SampleBatch& b) {
@@ -215,11 +229,11 @@ private:
 
     const std::int64_t until_ns_;
     std::atomic<bool>& stop_;  ///< aborts the pass; read often, because a tile may hold many samples
-    const std::span<CameraBatch> traced_;
+    const std::span<TracedRays> traced_;
     const std::span<SampleBatch> batches_;
     std::size_t full_ = 0;  ///< number of full batches
-    std::uint64_t samples_ = 0, paths_ = 0, met_ = 0, separate_ = 0;
-    std::uint32_t lit_ = 0;  ///< number of batches shaded so far
+    PassCount count_;
+    std::uint32_t shaded_ = 0;  ///< number of batches shaded so far
 };
 
 // From a tile's samples to the image.
@@ -273,12 +287,10 @@ void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const Pe
     if (sampled == 0) return;
     VarianceRatio ratio;
     t.each_pixel([&](int, int, std::size_t at) { ratio.add(means[at].*part, independent[at]); });
-    // The steps of a few pixels may be small by chance.
-    constexpr double kPixelsAsIndependent = 4;
+    constexpr double more = tuning::kPixelsAsIndependent;
     const auto n = static_cast<double>(sampled);
     const bool all = sampled == static_cast<std::size_t>(t.width * t.height);
-    const double value =
-        all ? ratio.value() : (n * ratio.value() + kPixelsAsIndependent) / (n + kPixelsAsIndependent);
+    const double value = all ? ratio.value() : (n * ratio.value() + more) / (n + more);
     t.each_pixel([&](int x, int y, std::size_t at) {
         variance[index_of(x, y, image_width)] += static_cast<float>(value * independent[at]);
     });
@@ -361,8 +373,14 @@ void put_pixels(const Tile& t, const PerPixel<float>& r, const PerPixel<float>& 
 
 /// Adds the samples of a batch to their pixels.
 inline void add_samples(const SampleBatch& b, const BatchRadiance& light, PerPixel<PixelMeans>& means) {
-    for_each_lane(b.direct_lanes, [&](std::size_t i) { means[b.place[i]].direct.add(light.direct[i]); });
-    for_each_lane(b.path_lanes, [&](std::size_t i) { means[b.place[i]].path.add(light.path[i]); });
+    const auto add = [&](std::uint32_t lanes, const RgbLanes& part, PixelMean PixelMeans::*to) {
+        for_each_lane(lanes, [&](std::size_t i) {
+            assert(is_finite(part[i]));
+            (means[b.place[i]].*to).add(part[i]);
+        });
+    };
+    add(b.direct_lanes, light.direct, &PixelMeans::direct);
+    add(b.path_lanes, light.path, &PixelMeans::path);
 }
 
 }  // namespace narpa

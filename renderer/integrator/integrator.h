@@ -1,65 +1,31 @@
-/// renderer/integrator/integrator.h - the radiance along the camera rays of a frame.
+/// renderer/integrator/integrator.h - radiance along rays whose first hits are known.
 ///
-/// Each frame has one integrator, chosen by make_frame: SunDirectLighting and DirectIntegrator for method "direct",
-/// PathIntegrator for method "path". A new one needs its own files and a line in make_frame.
+/// An integrator knows the scene, the poses of its bodies and the sample numbers of the rays, but no camera, image
+/// or budget: renderer/frame makes the rays and accumulates the radiance. A frame chooses one with
+/// `integrator_for`. A new one needs its own files and a place in `integrator_kinds`.
 #pragma once
 
-#include <chrono>
+#include <cassert>
 #include <cstdint>
-#include <optional>
 #include <span>
+#include <string_view>
 
-#include "renderer/camera/camera_pose.h"
-#include "renderer/camera/scene_camera.h"
-#include "renderer/integrator/frame_settings.h"
 #include "renderer/integrator/path.h"
-#include "renderer/integrator/subpixel_bodies.h"
-#include "renderer/light/render_scene.h"
-#include "renderer/light/sun_disc.h"
+#include "renderer/integrator/phase_clock.h"
 
 namespace narpa {
 
-class Integrator;
-
-/// Constants of a frame.
-struct Frame {
-    const RenderScene& render_scene;
-    const Tracer& tracer;
-    const BodyPoses& at;
-    const Camera& camera;
-    CameraPose pose;
-    Rigid3 T_world_camera;  ///< at mid-exposure
-    bool over_time;         ///< each ray has its own time; else all are at mid-exposure
-    const FrameSettings& settings;
-    CameraModelHandle model;
-    const Lens* lens;  ///< null: pinhole, all in focus
-    std::optional<SunDisc> sun;
-    const Integrator& integrator;
-    bool sun_only;      ///< the integrator is SunDirectLighting
-    bool separate_sun;  ///< the integrator is PathIntegrator, and BatchRadiance::direct holds the direct sunlight
-                        ///< at first hits
-    PathSettings path;  ///< settings of the other integrators
-    SubpixelBodies subpixel_bodies;
-
-    /// One sample per pixel goes through the centres of the pixel and of the lens, to the centre of the Sun.
-    [[nodiscard]] bool one_sample() const { return settings.spp == 1; }
-};
-
-/// All arguments but the pose outlive the frame.
-[[nodiscard]] Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Camera& camera,
-                               const CameraPose& pose, const FrameSettings& settings);
-
-/// A batch of camera samples: their rays and first hits.
-struct CameraBatch {
+/// A batch of rays and their first hits.
+struct TracedRays {
     RayBatch rays;
     HitBatch hits;
-    Vec3Lanes to_sun;       ///< if `sun_only` or `separate_sun`: direction to a point of the Sun for each
-    std::uint32_t lit = 0;  ///< out, in the same cases: lanes lit by the Sun
-    // Sample indices of the paths:
-    Lanes<std::uint32_t> number{};  ///< PixelSampler's "pixel"
-    Lanes<std::uint32_t> sample{};
+    Vec3Lanes to_sun;  ///< for integrators with a direct part: direction to a point of the Sun for each
+    // Sample indices of the paths, as in PathStart:
+    Lanes<std::uint32_t> number{}, sample{};
     std::uint32_t path_lanes = 0;  ///< lanes from which paths are traced
-    LitSurfaces first;             ///< out, where `separate_sun`
+    std::uint32_t lit = 0;         ///< out, from integrators with a direct part: lanes lit by the Sun
+    std::uint32_t complete = 0;    ///< out, for path tracing: lanes to whose radiance a path adds nothing
+    LitSurfaces first;             ///< out, for path tracing: surfaces whose direct sunlight is known
     Lanes<float> variance;         ///< out: estimated variance of the mean band of reused light
     // Counters:
     std::uint64_t rays_traced = 0;  ///< of all kinds
@@ -67,13 +33,18 @@ struct CameraBatch {
     PhaseTimes* times = nullptr;    ///< null: not measured
 };
 
-/// Radiance of a batch in two parts, for which a pixel may take different numbers of samples.
+/// The parts of the radiance that an integrator computes.
+enum class LightParts : std::uint8_t { direct, path, both };
+
+/// Radiance of a batch in two parts, for which a pixel may take different numbers of samples. Only the integrator's
+/// parts are set.
 struct BatchRadiance {
-    RgbLanes direct;  ///< SunDirectLighting's, or the direct sunlight at first hits if `separate_sun`
+    RgbLanes direct;  ///< sunlight at first hits, and light that needs no path
     RgbLanes path;    ///< all else
 
-    [[nodiscard]] Rgb operator()(const Frame& f, std::size_t i) const noexcept {
-        return f.sun_only ? direct[i] : direct[i] + path[i];
+    [[nodiscard]] Rgb total(LightParts parts, std::size_t i) const noexcept {
+        if (parts == LightParts::both) return direct[i] + path[i];
+        return parts == LightParts::direct ? direct[i] : path[i];
     }
 };
 
@@ -84,71 +55,24 @@ inline constexpr std::size_t kMaxPixelSamples = 16, kMaxBatches = kReuseGroup * 
 class Integrator {
 public:
     virtual ~Integrator() = default;
+    [[nodiscard]] virtual LightParts parts() const noexcept = 0;
     /// Radiance along all rays of one batch, each on its own.
-    virtual void radiance(const Frame& f, CameraBatch& batch, RgbLanes& radiance) const noexcept = 0;
+    virtual void radiance(const Transport& t, TracedRays& batch, RgbLanes& radiance) const noexcept = 0;
     /// Radiance of up to kMaxBatches batches, which hold up to kReuseGroup pixels, pixel by pixel with up to
     /// kMaxPixelSamples samples of each. Paths may be reused among the pixels.
-    virtual void radiance(const Frame& f, std::span<CameraBatch> batches,
+    virtual void radiance(const Transport& t, std::span<TracedRays> batches,
                           std::span<BatchRadiance> light) const noexcept = 0;
 };
 
-/// Sun-only direct lighting, sixteen lanes at once. Most frames of method "direct" show Lambert's and Phong's
-/// materials lit only by the Sun. These are shaded with vector instructions, material by material, with one batch
-/// of shadow rays; other materials are shaded lane by lane.
-class SunDirectLighting final : public Integrator {
-public:
-    /// True if the Sun, a uniform background and the emission of visible surfaces are the only light, and there is
-    /// no medium.
-    [[nodiscard]] static bool suffices(const RenderScene& render_scene) noexcept;
-
-    void radiance(const Frame& f, CameraBatch& batch, RgbLanes& radiance) const noexcept override;
-    void radiance(const Frame& f, std::span<CameraBatch> batches,
-                  std::span<BatchRadiance> light) const noexcept override;
+/// A method of light transport.
+struct IntegratorKind {
+    RenderSettings::Method method;
+    std::string_view name, help;
+    /// The fastest integrator that computes all light of the scene by this method. `separate_sun`: it may have a
+    /// direct part beside its paths.
+    const Integrator& (*choose)(const RenderScene& render_scene, bool separate_sun);
 };
-
-/// Method "direct" in any scene, by one round of the wavefront kernel (PathSettings::direct).
-class DirectIntegrator : public Integrator {
-public:
-    void radiance(const Frame& f, CameraBatch& batch, RgbLanes& radiance) const noexcept override;
-    void radiance(const Frame& f, std::span<CameraBatch> batches,
-                  std::span<BatchRadiance> light) const noexcept override;
-};
-
-/// Method "path": all light. Traces many batches together with path reuse and, if the Sun is the only emitter,
-/// computes the direct sunlight at first hits as SunDirectLighting does. Paths then add only the rest, from fewer
-/// samples: at equal error 9 % less time with 16 samples per pixel and 25 % with 64, on the craft with paths of
-/// four vertices.
-class PathIntegrator final : public DirectIntegrator {
-public:
-    using DirectIntegrator::radiance;
-    void radiance(const Frame& f, std::span<CameraBatch> batches,
-                  std::span<BatchRadiance> light) const noexcept override;
-};
-
-/// For PathIntegrator: adds emission and direct sunlight in lanes that hit flat faces of Lambert's material, or of
-/// Phong's unless its lobe is too sharp. Sets CameraBatch::first and CameraBatch::lit.
-void add_first_hit_sunlight(const Frame& f, CameraBatch& p, RgbLanes& radiance) noexcept;
-
-/// CLOCK_MONOTONIC.
-[[nodiscard]] inline std::int64_t now_ns() noexcept {
-    return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-/// Measures the time of a batch per phase, if enabled.
-class PhaseClock {
-public:
-    explicit PhaseClock(PhaseTimes* times) noexcept : times_(times), last_ns_(times != nullptr ? now_ns() : 0) {}
-    /// Adds the time since the last call, or since the start, to this phase.
-    void ends(Phase phase) noexcept {
-        if (times_ == nullptr) return;
-        const std::int64_t now = now_ns();
-        (*times_)[static_cast<std::size_t>(phase)] += now - last_ns_;
-        last_ns_ = now;
-    }
-
-private:
-    PhaseTimes* times_;
-    std::int64_t last_ns_;
-};
+[[nodiscard]] std::span<const IntegratorKind> integrator_kinds() noexcept;
+[[nodiscard]] const IntegratorKind& integrator_kind(RenderSettings::Method method) noexcept;
 
 }  // namespace narpa

@@ -32,38 +32,40 @@ struct PathSettings {
     bool reuse = true;
 };
 
-/// Sample indices of each ray: PixelSampler(seed, frame, pixel), and the index in its sequence. The first four
-/// dimensions belong to the caller.
-struct PathNumbers {
-    std::uint64_t seed = 0;
+/// Constants of the light in a frame.
+struct Transport {
+    const RenderScene& render_scene;
+    const BodyPoses& at;
+    PathSettings path;
+    std::uint64_t seed = 0;  ///< samples depend only on (seed, frame, pixel, sample)
     std::uint32_t frame = 0;
-    std::span<const std::uint32_t> pixel, sample;
 };
 
-/// Radiance, W m^-2 sr^-1, along rays whose first hits are known. Any number of rays; with a few dozen or more,
-/// batches stay full while paths end. Each result is independent of the other rays. Thread-safe, allocates nothing;
-/// takes 200 kB of stack. Returns the number of rays traced.
-std::uint64_t path_radiance(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
-                            std::span<const Ray> rays, std::span<const Hit> first, const PathNumbers& numbers,
-                            std::span<Rgb> radiance) noexcept;
-
-/// Lanes of a batch of first hits whose emission and direct sunlight are already in the radiance (integrator.h),
+/// Lanes of a batch of first hits whose emission and direct sunlight are already known (SunPathIntegrator),
 /// and the reflectances of these surfaces: flat, of Lambert's or Phong's material.
 struct LitSurfaces {
     std::uint32_t lanes = 0;
     RgbLanes diffuse, specular;
 };
-/// A camera sample in a batch, from which a path may begin.
+/// A lane of a batch of rays and their first hits, from which a path begins.
 struct PathStart {
     const RayBatch* rays;
     const HitBatch* hits;
-    const LitSurfaces* surfaces;
+    const LitSurfaces* surfaces;  ///< null: nothing is known of the light
     std::size_t lane;
-    std::uint32_t pixel, sample;  ///< as in PathNumbers
-    bool sunlit = false;          ///< if lit(): the direct sunlight there is not zero
+    /// PixelSampler(seed, frame, pixel), and the index in its sequence. The first four dimensions are the caller's.
+    std::uint32_t pixel, sample;
+    bool sunlit = false;  ///< if lit(): the direct sunlight there is not zero
 
-    [[nodiscard]] bool lit() const noexcept { return is_set(surfaces->lanes, lane); }
+    [[nodiscard]] bool lit() const noexcept { return surfaces != nullptr && is_set(surfaces->lanes, lane); }
 };
+
+/// Radiance, W m^-2 sr^-1, along any number of rays; with a few dozen or more, batches stay full while paths end.
+/// Each result is independent of the other rays. Thread-safe, allocates nothing; takes 200 kB of stack. Returns the
+/// number of rays traced.
+std::uint64_t path_radiance(const Transport& t, std::span<const PathStart> starts,
+                            std::span<Rgb> radiance) noexcept;
+
 /// Maximum number of paths that are reused among each other.
 inline constexpr std::size_t kReuseGroup = 64;
 
@@ -71,9 +73,7 @@ inline constexpr std::size_t kReuseGroup = 64;
 /// rays should belong to the same pixel, because results from the same path are correlated. `radiance`: out,
 /// without the light of LitSurfaces that is already known. `variance`: out, estimated for the mean band of reused
 /// light.
-std::uint64_t reused_path_radiance(const RenderScene& render_scene, const BodyPoses& at,
-                                   const PathSettings& settings, std::span<const PathStart> starts,
-                                   std::uint64_t seed, std::uint32_t frame, std::span<Rgb> radiance,
+std::uint64_t reused_path_radiance(const Transport& t, std::span<const PathStart> starts, std::span<Rgb> radiance,
                                    std::span<float> variance) noexcept;
 
 /// Largest angular diameter of a narrow Sun: next-event estimation alone finds its light on surfaces without a
@@ -81,10 +81,5 @@ std::uint64_t reused_path_radiance(const RenderScene& render_scene, const BodyPo
 inline constexpr double kNarrowSun_rad = 0.2;
 /// A lobe with a larger exponent is sampled better by the BSDF than by points of a narrow Sun.
 inline constexpr float kSharpLobe = 1000;
-/// True if the direct light at first hits may be computed separately (Frame::separate_sun): the Sun is narrow,
-/// nothing else emits, there is no medium, and some body is shaded flat.
-[[nodiscard]] bool sun_alone_lights_first_surfaces(const RenderScene& render_scene) noexcept;
-/// Radiance along a camera ray that escapes, without a medium: the background and the Sun's disc.
-[[nodiscard]] Rgb escaped_radiance(const RenderScene& render_scene, const Vec3& direction) noexcept;
 
 }  // namespace narpa

@@ -1,10 +1,13 @@
+#include "renderer/integrator/path_integrator.h"
+
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <limits>
-#include <new>
+#include <variant>
 
 #include "base/uninitialized_array.h"
-#include "renderer/integrator/integrator.h"
+#include "renderer/integrator/sun_direct_lighting.h"
 
 namespace narpa {
 namespace {
@@ -15,24 +18,16 @@ constexpr std::size_t kTogether = 8;
 /// Traces each ray on its own, for up to kTogether batches and the lanes that `lanes` gives for a batch.
 /// `put(batch, lane, radiance)` takes the results.
 template <class LanesOf, class Put>
-void trace_paths(const Frame& f, std::span<CameraBatch> batches, LanesOf&& lanes, Put&& put) {
+void trace_paths(const Transport& t, std::span<TracedRays> batches, LanesOf&& lanes, Put&& put) {
     PhaseClock clock(batches.front().times);
-    UninitializedArray<Ray, kTogether * kLanes> rays;
-    UninitializedArray<Hit, kTogether * kLanes> hits;
+    std::array<PathStart, kTogether * kLanes> starts;
     UninitializedArray<Rgb, kTogether * kLanes> light;
-    std::array<std::uint32_t, kTogether * kLanes> number, sample;
     std::size_t n = 0;
-    for (const CameraBatch& p : batches)
+    for (const TracedRays& p : batches)
         for_each_lane(lanes(p), [&](std::size_t i) {
-            // Constructed in place: a copy would stall on store forwarding from the partial writes.
-            new (&rays[n]) Ray(p.rays[i]);
-            new (&hits[n]) Hit(p.hits[i]);
-            number[n] = p.number[i], sample[n++] = p.sample[i];
+            starts[n++] = {&p.rays, &p.hits, nullptr, i, p.number[i], p.sample[i]};
         });
-    batches.front().rays_traced +=
-        path_radiance(f.render_scene, f.at, f.path, rays.first(n), hits.first(n),
-                      {f.settings.seed, f.settings.frame, std::span(number).first(n), std::span(sample).first(n)},
-                      light.first(n));
+    batches.front().rays_traced += path_radiance(t, std::span(starts).first(n), light.first(n));
     n = 0;
     for (std::size_t k = 0; k < batches.size(); ++k)
         for_each_lane(lanes(batches[k]), [&](std::size_t i) { put(k, i, light[n++]); });
@@ -45,7 +40,7 @@ struct SamplePlace {
 };
 
 /// Traces one sample of each of some pixels, with path reuse.
-void trace_reused(const Frame& f, std::span<CameraBatch> batches, std::span<const SamplePlace> places,
+void trace_reused(const Transport& t, std::span<TracedRays> batches, std::span<const SamplePlace> places,
                   std::span<BatchRadiance> light) {
     std::array<SamplePlace, kReuseGroup> from;
     std::array<PathStart, kReuseGroup> starts;
@@ -57,15 +52,14 @@ void trace_reused(const Frame& f, std::span<CameraBatch> batches, std::span<cons
         for (std::size_t i = 0; i < places.size(); ++i) {
             if (((i ^ i >> 2) & 1) != colour) continue;
             const auto [batch, lane] = places[i];
-            const CameraBatch& p = batches[batch];
-            if (f.separate_sun && !is_set(p.hits.met, lane)) continue;
+            const TracedRays& p = batches[batch];
+            if (is_set(p.complete, lane)) continue;
             from[n] = places[i];
-            const bool sunlit = light[batch].direct[lane] != Rgb{};
+            const bool sunlit = is_set(p.first.lanes, lane) && light[batch].direct[lane] != Rgb{};
             starts[n++] = {&p.rays, &p.hits, &p.first, lane, p.number[lane], p.sample[lane], sunlit};
         }
-    const std::uint64_t rays =
-        reused_path_radiance(f.render_scene, f.at, f.path, std::span(starts).first(n), f.settings.seed,
-                             f.settings.frame, std::span(radiance).first(n), std::span(variance).first(n));
+    const std::uint64_t rays = reused_path_radiance(t, std::span(starts).first(n), std::span(radiance).first(n),
+                                                    std::span(variance).first(n));
     batches.front().rays_traced += rays;
     batches.front().path_rays += rays;
     for (std::size_t i = 0; i < n; ++i) {
@@ -74,44 +68,15 @@ void trace_reused(const Frame& f, std::span<CameraBatch> batches, std::span<cons
     }
 }
 
-}  // namespace
-
-void DirectIntegrator::radiance(const Frame& f, CameraBatch& p, RgbLanes& radiance) const noexcept {
-    trace_paths(
-        f, std::span(&p, 1), [](const CameraBatch& batch) { return lanes_below(batch.rays.n); },
-        [&](std::size_t, std::size_t i, const Rgb& light) { radiance.put(i, light); });
-}
-void DirectIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
-                                std::span<BatchRadiance> light) const noexcept {
+/// The same for all samples: one sample of each pixel together, then the next of each, so that the samples of a
+/// pixel stay independent.
+void trace_all_reused(const Transport& t, std::span<TracedRays> batches, std::span<BatchRadiance> light) {
+    if (batches.empty()) return;
+    PhaseClock clock(batches.front().times);
     for (std::size_t k = 0; k < batches.size(); ++k) {
-        light[k].direct.fill({});
         light[k].path.fill({});
         batches[k].variance.fill(0);
     }
-    for (std::size_t first = 0; first < batches.size(); first += kTogether)
-        trace_paths(
-            f, batches.subspan(first, std::min(kTogether, batches.size() - first)),
-            [](const CameraBatch& batch) { return batch.path_lanes & lanes_below(batch.rays.n); },
-            [&](std::size_t k, std::size_t i, const Rgb& r) { light[first + k].path.put(i, r); });
-}
-
-void PathIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
-                              std::span<BatchRadiance> light) const noexcept {
-    for (std::size_t k = 0; k < batches.size(); ++k) {
-        CameraBatch& p = batches[k];
-        p.lit = p.first.lanes = 0;
-        light[k].direct.fill({});
-        light[k].path.fill({});
-        p.variance.fill(0);
-        if (!f.separate_sun) continue;
-        if (p.hits.met != 0) add_first_hit_sunlight(f, p, light[k].direct);
-        for_each_lane(lanes_below(p.rays.n) & ~p.hits.met, [&](std::size_t i) {
-            light[k].direct.put(i, escaped_radiance(f.render_scene, p.rays.direction[i]));
-        });
-    }
-    if (batches.empty()) return;
-    PhaseClock clock(batches.front().times);
-    // One sample of each pixel together, then the next of each, so that the samples of a pixel stay independent.
     std::array<std::array<SamplePlace, kReuseGroup>, kMaxPixelSamples> places;
     std::array<std::size_t, kMaxPixelSamples> n{};
     std::size_t rank = 0;
@@ -120,11 +85,81 @@ void PathIntegrator::radiance(const Frame& f, std::span<CameraBatch> batches,
         for_each_lane(batches[k].path_lanes & lanes_below(batches[k].rays.n), [&](std::size_t i) {
             rank = batches[k].number[i] == pixel ? rank + 1 : 0;
             pixel = batches[k].number[i];
+            assert(rank < kMaxPixelSamples && n[rank] < kReuseGroup);
             places[rank][n[rank]++] = {static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(i)};
         });
     for (std::size_t r = 0; r < kMaxPixelSamples && n[r] > 0; ++r)
-        trace_reused(f, batches, std::span(places[r]).first(n[r]), light);
+        trace_reused(t, batches, std::span(places[r]).first(n[r]), light);
     clock.ends(Phase::indirect);
+}
+
+void trace_each(const Transport& t, TracedRays& p, RgbLanes& radiance) {
+    trace_paths(
+        t, std::span(&p, 1), [](const TracedRays& batch) { return lanes_below(batch.rays.n); },
+        [&](std::size_t, std::size_t i, const Rgb& light) { radiance.put(i, light); });
+}
+
+/// Radiance along a camera ray that escapes, without a medium: the background and the Sun's disc.
+Rgb escaped_radiance(const RenderScene& render_scene, const Vec3& direction) noexcept {
+    const Rgb background = render_scene.background().radiance(direction);
+    const std::optional<SunDisc>& sun = render_scene.lights().sun();
+    if (!sun || sun->is_point() || sun->pdf(direction) == 0) return background;
+    return background + Rgb{sun->radiance(), sun->radiance(), sun->radiance()};
+}
+
+}  // namespace
+
+void DirectLighting::radiance(const Transport& t, TracedRays& p, RgbLanes& radiance) const noexcept {
+    trace_each(t, p, radiance);
+}
+void DirectLighting::radiance(const Transport& t, std::span<TracedRays> batches,
+                              std::span<BatchRadiance> light) const noexcept {
+    assert(t.path.direct && batches.size() <= light.size());
+    for (TracedRays& p : batches) p.variance.fill(0);
+    for (std::size_t first = 0; first < batches.size(); first += kTogether)
+        trace_paths(
+            t, batches.subspan(first, std::min(kTogether, batches.size() - first)),
+            [](const TracedRays& batch) { return batch.path_lanes & lanes_below(batch.rays.n); },
+            [&](std::size_t k, std::size_t i, const Rgb& r) { light[first + k].path.put(i, r); });
+}
+
+void PathIntegrator::radiance(const Transport& t, TracedRays& p, RgbLanes& radiance) const noexcept {
+    trace_each(t, p, radiance);
+}
+void PathIntegrator::radiance(const Transport& t, std::span<TracedRays> batches,
+                              std::span<BatchRadiance> light) const noexcept {
+    assert(!t.path.direct && batches.size() <= kMaxBatches && batches.size() <= light.size());
+    for (TracedRays& p : batches) p.first.lanes = p.complete = 0;
+    trace_all_reused(t, batches, light);
+}
+
+bool SunPathIntegrator::suffices(const RenderScene& render_scene) noexcept {
+    const Lights& lights = render_scene.lights();
+    if (lights.any(Lights::Group::all) || lights.any_with_extent() || !lights.sun()) return false;
+    if (render_scene.medium() != nullptr || render_scene.background().is_sampled()) return false;
+    const Scene& scene = render_scene.scene();
+    const auto is_flat = [&](const Body& b) {
+        const int* const mesh = std::get_if<int>(&b.shape);
+        return mesh == nullptr || scene.meshes[static_cast<std::size_t>(*mesh)].normals.empty();
+    };
+    if (std::ranges::none_of(scene.bodies, is_flat)) return false;
+    return lights.sun()->is_point() || scene.sun->angular_diameter_rad < kNarrowSun_rad;
+}
+
+void SunPathIntegrator::radiance(const Transport& t, std::span<TracedRays> batches,
+                                 std::span<BatchRadiance> light) const noexcept {
+    assert(!t.path.direct && batches.size() <= kMaxBatches && batches.size() <= light.size());
+    for (std::size_t k = 0; k < batches.size(); ++k) {
+        TracedRays& p = batches[k];
+        p.lit = p.first.lanes = 0;
+        p.complete = ~p.hits.met;
+        light[k].direct.fill({});
+        if (p.hits.met != 0) add_first_hit_sunlight(t, p, light[k].direct);
+        for_each_lane(lanes_below(p.rays.n) & ~p.hits.met, [&](std::size_t i) {
+            light[k].direct.put(i, escaped_radiance(t.render_scene, p.rays.direction[i]));
+        });
+    }
+    trace_all_reused(t, batches, light);
 }
 
 }  // namespace narpa

@@ -1,9 +1,10 @@
+#include "renderer/integrator/sun_direct_lighting.h"
+
 #include <algorithm>
 #include <bit>
 #include <numbers>
 
 #include "base/each_isa.h"
-#include "renderer/integrator/integrator.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/phong_lobe.h"
 
@@ -26,8 +27,9 @@ struct Sunlight {
     std::uint32_t lanes = 0;  ///< lanes where it is not zero
 };
 
-Surface surface_of(const Frame& f, const CameraBatch& p, std::size_t i) {
-    return surface_at(f.tracer, f.at, p.hits[i], p.rays.direction[i], p.hits.range_m[i] * f.path.pixel_angle_rad);
+Surface surface_of(const Transport& t, const TracedRays& p, std::size_t i) {
+    return surface_at(t.render_scene.tracer(), t.at, p.hits[i], p.rays.direction[i],
+                      p.hits.range_m[i] * t.path.pixel_angle_rad);
 }
 
 void put(SurfaceLanes& surfaces, std::size_t i, const Rgb& diffuse, const Rgb& specular, const Rgb& emission,
@@ -46,8 +48,8 @@ NARPA_EACH_ISA void fill(SurfaceLanes& surfaces, const Material& m, const Rgb& s
 }
 
 /// Material by material: a batch rarely meets more than two.
-void gather_surfaces(const Frame& f, const CameraBatch& p, SurfaceLanes& surfaces) {
-    const Scene& scene = f.tracer.scene();
+void gather_surfaces(const Transport& t, const TracedRays& p, SurfaceLanes& surfaces) {
+    const Scene& scene = t.render_scene.scene();
     surfaces.normal = p.hits.shading_normal;
     bool filled = false;
     for (std::uint32_t left = p.hits.met; left != 0;) {
@@ -65,7 +67,7 @@ void gather_surfaces(const Frame& f, const CameraBatch& p, SurfaceLanes& surface
         if (specular != Rgb{}) surfaces.shiny |= same;
         if (is_textured(m))
             for_each_lane(same, [&](std::size_t i) {
-                const Surface s = surface_of(f, p, i);
+                const Surface s = surface_of(t, p, i);
                 put(surfaces, i, s.diffuse, s.specular, s.emission, s.exponent);
                 surfaces.normal.put(i, s.normal);
             });
@@ -137,16 +139,17 @@ NARPA_EACH_ISA void reflect_sun(const SurfaceLanes& surfaces, const Vec3Lanes& d
 }
 
 /// The same for one lane of another material.
-void light_other(const Frame& f, const CameraBatch& p, std::size_t i, RgbLanes& radiance, Sunlight& sunlight) {
-    const Surface surface = surface_of(f, p, i);
-    radiance.put(i, surface.emission + f.render_scene.background().ambient() * ambient_reflectance(surface));
-    if (!f.sun) return;
+void light_other(const Transport& t, const TracedRays& p, std::size_t i, RgbLanes& radiance, Sunlight& sunlight) {
+    const Surface surface = surface_of(t, p, i);
+    radiance.put(i, surface.emission + t.render_scene.background().ambient() * ambient_reflectance(surface));
+    const std::optional<SunDisc>& sun = t.render_scene.lights().sun();
+    if (!sun) return;
     const double cosine = dot(surface.normal, p.to_sun[i]);
     if (cosine <= 0) return;
     const Rgb reflected = bsdf(surface, surface.normal, p.to_sun[i], -p.rays.direction[i]);
     if (reflected == Rgb{}) return;
-    const double projected = cosine / dot(p.to_sun[i], f.sun->centre());
-    sunlight.radiance.put(i, reflected * (f.sun->irradiance() * static_cast<float>(projected)));
+    const double projected = cosine / dot(p.to_sun[i], sun->centre());
+    sunlight.radiance.put(i, reflected * (sun->irradiance() * static_cast<float>(projected)));
     sunlight.lanes |= 1u << i;
 }
 
@@ -163,10 +166,10 @@ NARPA_EACH_ISA void add_sunlight(const Sunlight& sunlight, std::uint32_t lit, Rg
 }
 
 /// Traces the shadow rays of the lanes set, and adds the unshadowed sunlight.
-void add_sun(const Frame& f, CameraBatch& p, Sunlight& sunlight, PhaseClock& clock, RgbLanes& radiance) {
+void add_sun(const Transport& t, TracedRays& p, Sunlight& sunlight, PhaseClock& clock, RgbLanes& radiance) {
     clock.ends(Phase::shading);
     if (sunlight.lanes == 0) return;
-    p.lit = sunlight.lanes & ~f.tracer.occluded(f.at, p.hits, p.to_sun, sunlight.lanes);
+    p.lit = sunlight.lanes & ~t.render_scene.tracer().occluded(t.at, p.hits, p.to_sun, sunlight.lanes);
     p.rays_traced += static_cast<std::uint64_t>(std::popcount(sunlight.lanes));
     clock.ends(Phase::shadow_rays);
     if (p.lit != 0) add_sunlight(sunlight, p.lit, radiance);
@@ -190,7 +193,8 @@ bool SunDirectLighting::suffices(const RenderScene& render_scene) noexcept {
            render_scene.medium() == nullptr;
 }
 
-void SunDirectLighting::radiance(const Frame& f, CameraBatch& p, RgbLanes& radiance) const noexcept {
+void SunDirectLighting::radiance(const Transport& t, TracedRays& p, RgbLanes& radiance) const noexcept {
+    assert(p.rays.n <= kLanes && (p.hits.met & ~lanes_below(p.rays.n)) == 0);
     p.lit = 0;
     if (p.hits.met == 0) {
         radiance.fill({});
@@ -199,32 +203,33 @@ void SunDirectLighting::radiance(const Frame& f, CameraBatch& p, RgbLanes& radia
     PhaseClock clock(p.times);
     SurfaceLanes surfaces;
     Sunlight sunlight;
-    gather_surfaces(f, p, surfaces);
-    emit(surfaces, f.render_scene.background().ambient(), radiance);
-    if (f.sun && surfaces.lanes != 0)
-        reflect_sun(surfaces, p.rays.direction, p.to_sun, f.sun->centre(), f.sun->irradiance(), sunlight);
-    for_each_lane(surfaces.others, [&](std::size_t i) { light_other(f, p, i, radiance, sunlight); });
-    add_sun(f, p, sunlight, clock, radiance);
+    gather_surfaces(t, p, surfaces);
+    emit(surfaces, t.render_scene.background().ambient(), radiance);
+    if (const std::optional<SunDisc>& sun = t.render_scene.lights().sun(); sun && surfaces.lanes != 0)
+        reflect_sun(surfaces, p.rays.direction, p.to_sun, sun->centre(), sun->irradiance(), sunlight);
+    for_each_lane(surfaces.others, [&](std::size_t i) { light_other(t, p, i, radiance, sunlight); });
+    add_sun(t, p, sunlight, clock, radiance);
 }
 
-void SunDirectLighting::radiance(const Frame& f, std::span<CameraBatch> batches,
+void SunDirectLighting::radiance(const Transport& t, std::span<TracedRays> batches,
                                  std::span<BatchRadiance> light) const noexcept {
-    for (std::size_t k = 0; k < batches.size(); ++k) radiance(f, batches[k], light[k].direct);
+    for (std::size_t k = 0; k < batches.size(); ++k) radiance(t, batches[k], light[k].direct);
 }
 
-void add_first_hit_sunlight(const Frame& f, CameraBatch& p, RgbLanes& radiance) noexcept {
+void add_first_hit_sunlight(const Transport& t, TracedRays& p, RgbLanes& radiance) noexcept {
     PhaseClock clock(p.times);
     SurfaceLanes surfaces;
     Sunlight sunlight;
-    gather_surfaces(f, p, surfaces);
+    gather_surfaces(t, p, surfaces);
     surfaces.lanes = sunlit_by_nee_alone(p.hits, surfaces);
     if (surfaces.lanes == 0) return;
     p.first.lanes = surfaces.lanes;
     p.first.diffuse = surfaces.diffuse;
     p.first.specular = surfaces.specular;
     emit(surfaces, {}, radiance);
-    reflect_sun(surfaces, p.rays.direction, p.to_sun, f.sun->centre(), f.sun->irradiance(), sunlight);
-    add_sun(f, p, sunlight, clock, radiance);
+    const SunDisc& sun = *t.render_scene.lights().sun();
+    reflect_sun(surfaces, p.rays.direction, p.to_sun, sun.centre(), sun.irradiance(), sunlight);
+    add_sun(t, p, sunlight, clock, radiance);
 }
 
 }  // namespace narpa

@@ -1,6 +1,7 @@
 #include "renderer/integrator/wavefront.h"
 
 #include <algorithm>
+#include <cassert>
 #include <new>
 #include <type_traits>
 
@@ -15,10 +16,10 @@ namespace {
 constexpr float kFaint = 0.5f, kFaintUnlit = 0.25f;
 constexpr int kUnlitVertices = 4;
 
-NARPA_EACH_ISA void draw_points(const PathNumbers& from, std::size_t n, const Lanes<std::uint32_t>& pixel,
+NARPA_EACH_ISA void draw_points(const Transport& t, std::size_t n, const Lanes<std::uint32_t>& pixel,
                                 const Lanes<std::uint32_t>& sample, std::uint32_t group,
                                 BatchSampler::Points& u) noexcept {
-    BatchSampler(from.seed, from.frame, n, pixel, sample).points(group, u);
+    BatchSampler(t.seed, t.frame, n, pixel, sample).points(group, u);
 }
 
 /// Assigns what `make` returns, without a temporary: storing that in parts and loading it whole would stall store
@@ -31,40 +32,32 @@ void assign(T& to, const auto& make) {
 
 }  // namespace
 
-Wavefront::Wavefront(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
-                     const PathNumbers& numbers)
-    : render_scene_(render_scene),
-      tracer_(render_scene.tracer()),
-      lights_(render_scene.lights()),
-      background_(render_scene.background()),
-      medium_(render_scene.medium()),
-      at_(at),
-      settings_(settings),
-      numbers_(numbers),
-      group_(settings.direct ? Lights::Group::lights : Lights::Group::all),
+Wavefront::Wavefront(const Transport& t)
+    : render_scene_(t.render_scene),
+      tracer_(t.render_scene.tracer()),
+      lights_(t.render_scene.lights()),
+      background_(t.render_scene.background()),
+      medium_(t.render_scene.medium()),
+      at_(t.at),
+      settings_(t.path),
+      transport_(t),
+      group_(t.path.direct ? Lights::Group::lights : Lights::Group::all),
       sun_(lights_.sun() ? &*lights_.sun() : nullptr),
       sun_has_extent_(sun_ != nullptr && !sun_->is_point()),
-      narrow_sun_(sun_ != nullptr && render_scene.scene().sun->angular_diameter_rad < kNarrowSun_rad),
-      small_bodies_(settings.small_bodies && sun_ != nullptr && !settings.direct),
+      narrow_sun_(sun_ != nullptr && t.render_scene.scene().sun->angular_diameter_rad < kNarrowSun_rad),
+      small_bodies_(t.path.small_bodies && sun_ != nullptr && !t.path.direct),
       emitters_(lights_.any(group_)),
-      background_sampled_(background_.is_sampled() && !settings.direct),
+      background_sampled_(background_.is_sampled() && !t.path.direct),
       receivers_(emitters_ || lights_.any_with_extent() || small_bodies_ || medium_ != nullptr),
       finds_alone_(background_.uniform() != Rgb{} || (sun_has_extent_ && !narrow_sun_)),
       sun_alone_(!lights_.any(Lights::Group::all) && !lights_.any_with_extent() && background_.uniform() == Rgb{} &&
                  medium_ == nullptr) {}
 
-void Wavefront::run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance) {
+void Wavefront::run(std::span<const PathStart> starts, std::span<Rgb> radiance) {
+    assert(starts.size() <= kWavefront);
+    starts_ = starts;
     radiance_ = radiance;
-    n_ = rays.size();
-    for (std::size_t i = 0; i < n_; ++i) {
-        radiance_[i] = {};
-        hits_[i] = first[i];
-        directions_[i] = rays[i].direction;
-        paths_[i] = Path{};
-        paths_[i].ray = static_cast<std::uint32_t>(i);
-        paths_[i].to = &radiance_[i];
-        if (receivers_) paths_[i].start = {.anchor = rays[i].origin, .time = rays[i].time};
-    }
+    begin();
     run_rounds();
 }
 
@@ -72,10 +65,12 @@ void Wavefront::run_reused(std::span<const PathStart> starts, std::span<Rgb> rad
     grouped_ = !settings_.direct && settings_.max_depth > 1;
     // A medium would absorb light between the connected vertices.
     reuse_ = grouped_ && settings_.reuse && medium_ == nullptr;
+    starts_ = starts;
     radiance_ = radiance;
     variance_ = variance;
     std::fill(variance.begin(), variance.end(), 0.0f);
-    begin_reused(starts);
+    first_.clear();
+    begin();
     run_rounds();
 }
 
@@ -149,8 +144,8 @@ void Wavefront::find_segments(int vertex) {
         rays[i] = {{path.start.anchor + path.start.offset, directions_[i], path.start.time},
                    hits_[i].body < 0 ? kInfinity : hits_[i].range_m};
         if (!medium_->uses_random_numbers()) continue;
-        const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[path.ray]);
-        rays[i].u = numbers.point(numbers_.sample[path.ray], medium_group(vertex))[0];
+        const PathStart& start = starts_[path.ray];
+        rays[i].u = sampler(start).point(start.sample, medium_group(vertex))[0];
     }
     medium_->along_each(at_, rays.first(n_), segments_.first(n_));
 }
@@ -281,16 +276,16 @@ float Wavefront::first_survival(const Rgb& albedo, bool unlit) const {
     return settings_.first_survival * std::min(1.0f, max_component(albedo) / (unlit ? kFaintUnlit : kFaint));
 }
 
-void Wavefront::begin_reused(std::span<const PathStart> starts) {
-    first_.clear();
+/// Makes the paths. A reused one passes the roulette of its first vertex here if the direct light there is known.
+void Wavefront::begin() {
     n_ = 0;
-    for (std::size_t from = 0; from < starts.size(); from += kLanes) {
-        const std::span<const PathStart> batch = starts.subspan(from, std::min(kLanes, starts.size() - from));
+    for (std::size_t from = 0; from < starts_.size(); from += kLanes) {
+        const std::span<const PathStart> batch = starts_.subspan(from, std::min(kLanes, starts_.size() - from));
         Points roulette;
-        if (!finds_alone_) {
+        if (grouped_ && !finds_alone_) {
             Lanes<std::uint32_t> pixel{}, sample{};
             for (std::size_t k = 0; k < batch.size(); ++k) pixel[k] = batch[k].pixel, sample[k] = batch[k].sample;
-            draw_points(numbers_, batch.size(), pixel, sample, roulette_group(0), roulette);
+            draw_points(transport_, batch.size(), pixel, sample, roulette_group(0), roulette);
         }
         for (std::size_t k = 0; k < batch.size(); ++k) {
             const std::size_t ray = from + k;
@@ -344,9 +339,8 @@ SecondVertex* Wavefront::second_vertex(const Path& path, int vertex) {
                                                   : nullptr;
 }
 void Wavefront::reuse() {
-    const PixelSampler numbers(numbers_.seed, numbers_.frame, numbers_.pixel[0]);
-    rays_traced_ += first_.gather(tracer_, at_, second_.first(n_second_),
-                                  numbers.point(numbers_.sample[0], kReuseDimensions)[0], settings_.pixel_angle_rad,
+    const double choice = sampler(starts_[0]).point(starts_[0].sample, kReuseDimensions)[0];
+    rays_traced_ += first_.gather(tracer_, at_, second_.first(n_second_), choice, settings_.pixel_angle_rad,
                                   radiance_, variance_);
 }
 
@@ -354,10 +348,10 @@ void Wavefront::draw(std::size_t first, std::uint32_t group, Points& u) const {
     const std::size_t n = std::min(kLanes, n_ - first);
     Lanes<std::uint32_t> pixel{}, sample{};
     for (std::size_t k = 0; k < n; ++k) {
-        pixel[k] = numbers_.pixel[paths_[first + k].ray];
-        sample[k] = numbers_.sample[paths_[first + k].ray];
+        const PathStart& start = starts_[paths_[first + k].ray];
+        pixel[k] = start.pixel, sample[k] = start.sample;
     }
-    draw_points(numbers_, n, pixel, sample, group, u);
+    draw_points(transport_, n, pixel, sample, group, u);
 }
 
 void Wavefront::keep(std::size_t from, std::size_t to) {

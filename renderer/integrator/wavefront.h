@@ -39,11 +39,11 @@ struct ShadowRay {
 
 class Wavefront {
 public:
-    Wavefront(const RenderScene& render_scene, const BodyPoses& at, const PathSettings& settings,
-              const PathNumbers& numbers);
+    /// `transport` outlives it.
+    explicit Wavefront(const Transport& transport);
 
-    /// Traces each path on its own. Spans as in path_radiance; at most kWavefront rays.
-    void run(std::span<const Ray> rays, std::span<const Hit> first, std::span<Rgb> radiance);
+    /// Traces each path on its own, at most kWavefront.
+    void run(std::span<const PathStart> starts, std::span<Rgb> radiance);
     /// With path reuse; see reused_path_radiance.
     void run_reused(std::span<const PathStart> starts, std::span<Rgb> radiance, std::span<float> variance);
     [[nodiscard]] std::uint64_t rays_traced() const { return rays_traced_; }
@@ -51,6 +51,7 @@ public:
 private:
     using Points = BatchSampler::Points;
 
+    void begin();
     void run_rounds();
 
     // Extend.
@@ -82,7 +83,6 @@ private:
     [[nodiscard]] float first_survival(const Rgb& albedo, bool unlit) const;
 
     // Path reuse.
-    void begin_reused(std::span<const PathStart> starts);
     void sample_small_bodies(Path& path, const PathStart& unlit) const;
     void collect_second_vertices();
     [[nodiscard]] SecondVertex* second_vertex(const Path& path, int vertex);
@@ -90,6 +90,10 @@ private:
 
     /// Draws the sample dimensions of a group for the batch that begins with path `first`.
     void draw(std::size_t first, std::uint32_t group, Points& u) const;
+    /// The sample numbers of a path.
+    [[nodiscard]] PixelSampler sampler(const PathStart& start) const {
+        return {transport_.seed, transport_.frame, start.pixel};
+    }
     void keep(std::size_t from, std::size_t to);
     static void add(const Path& path, const Rgb& radiance) { *path.to += path.throughput * radiance; }
 
@@ -100,7 +104,8 @@ private:
     const Medium* const medium_;
     const BodyPoses& at_;
     const PathSettings& settings_;
-    const PathNumbers numbers_;
+    const Transport& transport_;
+    std::span<const PathStart> starts_;
     // Features of the scene; absent ones cost nothing:
     const Lights::Group group_;
     const SunDisc* const sun_;

@@ -3,7 +3,7 @@
 /// BSDF sampling alone would send one ray in a thousand to the Earth in the Moon's sky. So in scenes with a Sun a
 /// fraction of the rays is sampled uniformly in the cones around the bounding spheres of other bodies; the density
 /// is that of the mixture, so the estimate is unbiased. If other bodies fill much of the sky, and on meshes, which
-/// may light themselves, the fraction is smaller; first surfaces whose sunlight is separate (Frame::separate_sun)
+/// may light themselves, the fraction is smaller; first surfaces whose sunlight is separate (SunPathIntegrator)
 /// and not zero use none.
 #pragma once
 

@@ -3,7 +3,6 @@
 
 #include <numeric>
 
-#include "renderer/integrator/integrator.h"
 #include "tests/renderer/frame/budget_support.h"
 
 namespace narpa {

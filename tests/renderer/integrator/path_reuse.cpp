@@ -25,9 +25,6 @@ struct Picture {
 
 /// Rays through the pixel centres and their first hits, in batches.
 struct View {
-    std::array<Ray, kPixels> rays;
-    std::array<Hit, kPixels> first;
-    std::array<std::uint32_t, kPixels> number;
     std::array<RayBatch, kPixels / kLanes> ray_batches;
     std::array<HitBatch, kPixels / kLanes> hit_batches;
 
@@ -38,11 +35,8 @@ struct View {
         for (std::size_t i = 0; i < kPixels; ++i) {
             const double x = (static_cast<double>(i % kSide) + 0.5) / kSide - 0.5,
                          y = (static_cast<double>(i / kSide) + 0.5) / kSide - 0.5;
-            rays[i] = ray_to(eye, target + width_m * (x * across + y * down));
-            first[i] = render_scene.tracer().intersect(at, rays[i], kInfinity);
-            number[i] = static_cast<std::uint32_t>(i);
             ray_batches[i / kLanes].n = kLanes;
-            ray_batches[i / kLanes].put(i % kLanes, rays[i]);
+            ray_batches[i / kLanes].put(i % kLanes, ray_to(eye, target + width_m * (x * across + y * down)));
         }
         for (std::size_t k = 0; k < ray_batches.size(); ++k)
             render_scene.tracer().intersect(at, ray_batches[k], render_scene.tracer().all_bodies(), hit_batches[k]);
@@ -52,29 +46,30 @@ struct View {
 using Trace = std::uint64_t (*)(const RenderScene&, const BodyPoses&, const View&, const PathSettings&,
                                 std::uint64_t seed, std::uint32_t sample, std::array<Rgb, kPixels>& light);
 
+std::array<PathStart, kPixels> starts_of(const View& view, std::uint32_t sample) {
+    std::array<PathStart, kPixels> starts;
+    for (std::size_t i = 0; i < kPixels; ++i)
+        starts[i] = {&view.ray_batches[i / kLanes],
+                     &view.hit_batches[i / kLanes],
+                     nullptr,
+                     i % kLanes,
+                     static_cast<std::uint32_t>(i),
+                     sample};
+    return starts;
+}
+
 std::uint64_t each_for_itself(const RenderScene& render_scene, const BodyPoses& at, const View& view,
                               const PathSettings& settings, std::uint64_t seed, std::uint32_t sample,
                               std::array<Rgb, kPixels>& light) {
-    std::array<std::uint32_t, kPixels> samples;
-    samples.fill(sample);
-    return path_radiance(render_scene, at, settings, view.rays, view.first, {seed, 0, view.number, samples}, light);
+    return path_radiance({render_scene, at, settings, seed}, starts_of(view, sample), light);
 }
 
 std::uint64_t together(const RenderScene& render_scene, const BodyPoses& at, const View& view,
                        const PathSettings& settings, std::uint64_t seed, std::uint32_t sample,
                        std::array<Rgb, kPixels>& light) {
     static_assert(kPixels == kReuseGroup);
-    const LitSurfaces nothing_known{};
-    std::array<PathStart, kReuseGroup> first;
-    for (std::size_t i = 0; i < kPixels; ++i)
-        first[i] = {&view.ray_batches[i / kLanes],
-                    &view.hit_batches[i / kLanes],
-                    &nothing_known,
-                    i % kLanes,
-                    view.number[i],
-                    sample};
     std::array<float, kReuseGroup> variance;
-    return reused_path_radiance(render_scene, at, settings, first, seed, 0, light, variance);
+    return reused_path_radiance({render_scene, at, settings, seed}, starts_of(view, sample), light, variance);
 }
 
 Picture picture(const RenderScene& render_scene, const BodyPoses& at, const View& view,

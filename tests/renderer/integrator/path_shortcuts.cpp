@@ -1,4 +1,5 @@
 // What paths leave out, or do with a part of the rays alone, changes no mean.
+#include "renderer/integrator/path_integrator.h"
 #include "renderer/light/small_body_sampling.h"
 #include "tests/renderer/integrator/path_support.h"
 
@@ -32,11 +33,11 @@ TEST(PathShortcuts, TheLastRayIsSkippedOnlyWhereItFindsNothing) {
             for (std::uint32_t pixel = 0; pixel < 64; ++pixel) {
                 const Ray ray = ray_to({-1, -3, 2}, {0.02 * pixel - 0.6, 0.1, 0});
                 const Hit first = unlit->tracer().intersect(at, ray, kInfinity);
-                const std::uint32_t sample = 5;
+                PathRays rays(1);
+                rays.put(0, ray, first, pixel);
                 Rgb less, more;
                 const auto trace = [&](const RenderScene& render_scene, Rgb& out) {
-                    return path_radiance(render_scene, at, settings, std::span(&ray, 1), std::span(&first, 1),
-                                         {1, 0, std::span(&pixel, 1), std::span(&sample, 1)}, std::span(&out, 1));
+                    return rays.trace({render_scene, at, settings, 1}, 5, std::span(&out, 1));
                 };
                 few += trace(*unlit, less);
                 many += trace(*all_the_way, more);
@@ -75,9 +76,9 @@ TEST(PathShortcuts, SunlightIsSeparateOnlyWhereSomeBodyIsShadedFlat) {
         s.materials = {lambert(0.9f)};
         add_mesh(s, icosphere(2, 1, smooth));
         add_sun(s, {0, 0, 1});
-        EXPECT_EQ(sun_alone_lights_first_surfaces(*RenderScene::create(s, 1)), !smooth);
+        EXPECT_EQ(SunPathIntegrator::suffices(*RenderScene::create(s, 1)), !smooth);
         add_sphere(s, 1, {0, 0, 5});
-        EXPECT_TRUE(sun_alone_lights_first_surfaces(*RenderScene::create(s, 1)));
+        EXPECT_TRUE(SunPathIntegrator::suffices(*RenderScene::create(s, 1)));
     }
 }
 

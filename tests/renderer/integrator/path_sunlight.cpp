@@ -188,22 +188,19 @@ std::vector<Rgb> picture(const RenderScene& render_scene, const BodyPoses& at, c
     std::vector<Rgb> pixels(kGridSide * kGridSide);
     tbb::parallel_for(std::size_t{0}, (pixels.size() + together - 1) / together, [&](std::size_t block) {
         const std::size_t from = block * together, n = std::min(together, pixels.size() - from);
-        std::vector<Ray> rays(n);
-        std::vector<Hit> first(n);
+        PathRays rays(n);
         std::vector<Rgb> radiance(n);
-        std::vector<std::uint32_t> number(n), sample(n);
         for (std::size_t i = 0; i < n; ++i) {
             const std::size_t pixel = from + i;
             const double x = static_cast<double>(pixel % kGridSide) / kGridSide - 0.5,
                          y = static_cast<double>(pixel / kGridSide) / kGridSide - 0.5;
-            rays[i] = ray_to({3, -3, 3}, {3 * (x + y), 3 * (x - y), 0.5});
-            rays[i].origin += offset;
-            first[i] = render_scene.tracer().intersect(at, rays[i], kInfinity);
-            number[i] = static_cast<std::uint32_t>(pixel);
+            Ray ray = ray_to({3, -3, 3}, {3 * (x + y), 3 * (x - y), 0.5});
+            ray.origin += offset;
+            rays.put(i, ray, render_scene.tracer().intersect(at, ray, kInfinity),
+                     static_cast<std::uint32_t>(pixel));
         }
         for (std::uint32_t s = 0; s < 8; ++s) {
-            sample.assign(n, s);
-            path_radiance(render_scene, at, settings, rays, first, {3, 0, number, sample}, radiance);
+            rays.trace({render_scene, at, settings, 3}, s, radiance);
             for (std::size_t i = 0; i < n; ++i) pixels[from + i] += radiance[i];
         }
     });
@@ -238,8 +235,10 @@ TEST(PathRadiance, AllocatesNothing) {
     ASSERT_TRUE(render_scene);
     const BodyPoses at = placed(s);
     const Ray ray = ray_to({3, -3, 3}, {0.5, -0.75, 0.5});
-    const Hit first = render_scene->tracer().intersect(at, ray, kInfinity);
-    const auto trace = [&](std::uint32_t sample) { light_along(*render_scene, at, ray, first, {}, 1, 0, sample); };
+    PathRays rays(1);
+    rays.put(0, ray, render_scene->tracer().intersect(at, ray, kInfinity), 0);
+    Rgb light;
+    const auto trace = [&](std::uint32_t sample) { rays.trace({*render_scene, at, {}, 1}, sample, {&light, 1}); };
     trace(0);
     const AllocationCounter counter;
     for (std::uint32_t k = 1; k < 64; ++k) trace(k);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "renderer/integrator/path.h"
 #include "tests/support/shapes.h"
@@ -14,26 +15,39 @@ namespace narpa::test {
 /// Direct light only.
 inline const PathSettings kDirectLight{.max_depth = 1};
 
-/// This sample for every lane.
-inline Lanes<std::uint32_t> the_same(std::uint32_t sample) {
-    Lanes<std::uint32_t> all;
-    all.fill(sample);
-    return all;
-}
-/// 0, 1, 2 ...: a pixel of its own for each lane.
-inline const Lanes<std::uint32_t> kOwnPixels = [] {
-    Lanes<std::uint32_t> all;
-    for (std::uint32_t i = 0; i < kLanes; ++i) all[i] = i;
-    return all;
-}();
+/// Rays with their first hits, from which paths begin.
+class PathRays {
+public:
+    explicit PathRays(std::size_t n) : rays_((n + kLanes - 1) / kLanes), hits_(rays_.size()), starts_(n) {}
+
+    void put(std::size_t i, const Ray& ray, const Hit& first, std::uint32_t pixel) {
+        RayBatch& rays = rays_[i / kLanes];
+        HitBatch& hits = hits_[i / kLanes];
+        rays.n = std::max(rays.n, i % kLanes + 1);
+        rays.put(i % kLanes, ray);
+        hits.put(i % kLanes, first);
+        starts_[i] = {&rays, &hits, nullptr, i % kLanes, pixel, 0};
+    }
+    /// Radiance of this sample of each. Returns the number of rays traced.
+    std::uint64_t trace(const Transport& t, std::uint32_t sample, std::span<Rgb> radiance) {
+        for (PathStart& s : starts_) s.sample = sample;
+        return path_radiance(t, starts_, radiance);
+    }
+
+private:
+    std::vector<RayBatch> rays_;
+    std::vector<HitBatch> hits_;
+    std::vector<PathStart> starts_;
+};
 
 /// Radiance along one ray by one sample.
 inline Rgb light_along(const RenderScene& render_scene, const BodyPoses& at, const Ray& ray, const Hit& first,
                        const PathSettings& settings, std::uint64_t seed, std::uint32_t pixel,
                        std::uint32_t sample) {
     Rgb radiance;
-    path_radiance(render_scene, at, settings, std::span(&ray, 1), std::span(&first, 1),
-                  {seed, 0, std::span(&pixel, 1), std::span(&sample, 1)}, std::span(&radiance, 1));
+    PathRays one(1);
+    one.put(0, ray, first, pixel);
+    one.trace({render_scene, at, settings, seed}, sample, std::span(&radiance, 1));
     return radiance;
 }
 
@@ -53,15 +67,13 @@ struct Estimate {
 /// Mean of kLanes independent pixels' means of `samples` each; their scatter tells the error.
 inline Estimate light_along(const RenderScene& render_scene, const BodyPoses& at, const Ray& ray,
                             const PathSettings& settings, std::uint32_t samples, std::uint64_t seed = 1) {
-    std::array<Ray, kLanes> rays;
-    rays.fill(ray);
-    std::array<Hit, kLanes> first;
-    first.fill(render_scene.tracer().intersect(at, ray, kInfinity));
+    const Hit first = render_scene.tracer().intersect(at, ray, kInfinity);
+    PathRays rays(kLanes);
+    for (std::size_t i = 0; i < kLanes; ++i) rays.put(i, ray, first, static_cast<std::uint32_t>(i));
     std::array<Vec3, kLanes> sum{};
     for (std::uint32_t s = 0; s < samples; ++s) {
         std::array<Rgb, kLanes> radiance;
-        const Lanes<std::uint32_t> sample = the_same(s);
-        path_radiance(render_scene, at, settings, rays, first, {seed, 0, kOwnPixels, sample}, radiance);
+        rays.trace({render_scene, at, settings, seed}, s, radiance);
         for (std::size_t i = 0; i < kLanes; ++i) sum[i] += vec_cast<double>(radiance[i]);
     }
     Estimate e;

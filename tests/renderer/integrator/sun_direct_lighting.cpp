@@ -7,7 +7,7 @@
 #include <random>
 
 #include "base/fast_math.h"
-#include "renderer/frame/camera_batch.h"
+#include "renderer/frame/camera_rays.h"
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/bsdf.h"
@@ -137,6 +137,12 @@ struct BlockerStage {
     }
 };
 
+/// Rays and first hits, of all bodies.
+void trace(const Frame& f, const CameraSamples& s, TracedRays& p) {
+    aim_rays(f, s, p);
+    find_first_hits(f, f.tracer.all_bodies(), p);
+}
+
 TEST(CameraBatch, RaysEqualThoseOfSinglePixels) {
     std::mt19937_64 random(4);
     Camera pinhole = camera(200, 160, 400), lens = pinhole;
@@ -144,11 +150,11 @@ TEST(CameraBatch, RaysEqualThoseOfSinglePixels) {
     for (const Camera& c : {pinhole, lens}) {
         const BlockerStage stage(c);
         const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-        auto p = std::make_unique<CameraBatch>();
+        auto p = std::make_unique<TracedRays>();
         for (int round = 0; round < 200; ++round) {
             CameraSamples s = some_samples(1 + random() % kLanes, c, 40, random);
             s.centre = round % 4 == 0;
-            trace_rays(f, s, stage.render_scene.tracer().all_bodies(), *p);
+            trace(f, s, *p);
             ASSERT_EQ(p->rays.n, s.n);
             for (std::size_t i = 0; i < s.n; ++i) {
                 const PixelSampler sampler(stage.settings.seed, stage.settings.frame, s.number[i]);
@@ -178,10 +184,10 @@ TEST(CameraBatch, OneSampleGoesThroughAllCentres) {
     BlockerStage stage(c);
     stage.settings.spp = 1;
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-    auto p = std::make_unique<CameraBatch>();
+    auto p = std::make_unique<TracedRays>();
     CameraSamples s = some_samples(kLanes, c, 1, random);
     s.centre = true;
-    trace_rays(f, s, stage.render_scene.tracer().all_bodies(), *p);
+    trace(f, s, *p);
     for (std::size_t i = 0; i < s.n; ++i) {
         const Ray ray = camera_ray(c, stage.T, s.x[i], s.y[i]);
         ASSERT_EQ(p->rays[i].origin, ray.origin);
@@ -194,15 +200,15 @@ TEST(BatchRadiance, EqualsThatOfOneRayAtATime) {
     std::mt19937_64 random(5);
     const BlockerStage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-    ASSERT_TRUE(f.sun_only);
-    auto p = std::make_unique<CameraBatch>();
+    ASSERT_EQ(f.parts, LightParts::direct);
+    auto p = std::make_unique<TracedRays>();
     int lit = 0, shaded = 0, background = 0;
     for (int round = 0; round < 1500; ++round) {
         const CameraSamples s = some_samples(1 + random() % kLanes, stage.view, 16, random);
         RgbLanes radiance;
         const std::uint64_t rays_before = p->rays_traced;
-        trace_rays(f, s, stage.render_scene.tracer().all_bodies(), *p);
-        f.integrator.radiance(f, *p, radiance);
+        trace(f, s, *p);
+        f.integrator.radiance(f.transport, *p, radiance);
         std::uint64_t rays = s.n;
         for (std::size_t i = 0; i < s.n; ++i) {
             const Hit hit = p->hits[i];
@@ -212,8 +218,8 @@ TEST(BatchRadiance, EqualsThatOfOneRayAtATime) {
                 ++background;
             } else {
                 const Vec3 d = p->rays.direction[i];
-                const Surface surface =
-                    surface_at(stage.render_scene.tracer(), stage.at, hit, d, hit.range_m * f.path.pixel_angle_rad);
+                const Surface surface = surface_at(stage.render_scene.tracer(), stage.at, hit, d,
+                                                   hit.range_m * f.transport.path.pixel_angle_rad);
                 expected = surface.emission + stage.scene.ambient * ambient_reflectance(surface);
                 const double cosine = dot(surface.normal, p->to_sun[i]);
                 const Rgb reflected = bsdf(surface, surface.normal, p->to_sun[i], -d);
@@ -244,13 +250,13 @@ TEST(BatchRadiance, TimesOfThePhasesAddUpWhereTheyAreMeasured) {
     std::mt19937_64 random(6);
     const BlockerStage stage(camera(64, 64, 100));
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
-    auto p = std::make_unique<CameraBatch>();
+    auto p = std::make_unique<TracedRays>();
     PhaseTimes times{};
     p->times = &times;
     RgbLanes radiance;
     for (int round = 0; round < 300; ++round) {
-        trace_rays(f, some_samples(kLanes, stage.view, 16, random), stage.render_scene.tracer().all_bodies(), *p);
-        f.integrator.radiance(f, *p, radiance);
+        trace(f, some_samples(kLanes, stage.view, 16, random), *p);
+        f.integrator.radiance(f.transport, *p, radiance);
     }
     for (const Phase phase : {Phase::aim, Phase::rays, Phase::shading, Phase::shadow_rays})
         EXPECT_GT(times[static_cast<std::size_t>(phase)], 0);

@@ -1,4 +1,4 @@
-/// renderer/integrator/subpixel_bodies.h - bodies so small in the image that a pixel's few rays would miss or
+/// renderer/frame/subpixel_bodies.h - bodies so small in the image that a pixel's few rays would miss or
 /// overweight them by chance.
 ///
 /// A sphere of 10 m at 100 km covers 0.014 of a pixel: 64 random samples estimate its light with 107 % noise. Such

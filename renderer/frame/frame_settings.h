@@ -1,4 +1,4 @@
-/// renderer/integrator/frame_settings.h - settings, budget and account of a frame.
+/// renderer/frame/frame_settings.h - settings, budget and account of a frame.
 ///
 /// A frame is rendered in passes. The first takes one sample for each pixel; if even that may not fit the budget,
 /// the frame goes from coarse to fine, so that a complete image exists early. With the Sun as the only light, the
@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "renderer/integrator/phase_clock.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -49,11 +50,6 @@ struct FrameBudget {
     std::uint8_t step = 0;                           ///< kind passes only: FrameStep at which the frame stopped
 };
 
-/// Phases of rendering; times in ns, summed over the threads.
-enum class Phase : std::uint8_t { aim, rays, shading, shadow_rays, indirect, passes };
-inline constexpr std::size_t kPhases = 6;
-using PhaseTimes = std::array<std::int64_t, kPhases>;
-
 struct FrameAccount {
     FrameStep step = FrameStep::refined;
     std::uint64_t samples = 0;  ///< camera samples of the passes that count
@@ -75,7 +71,6 @@ struct Mechanisms {
     bool small_body_sampling = true;  ///< small_body_sampling.h; off: BSDF sampling only
     bool separate_sun = true;         ///< more samples for direct sunlight at first hits than for paths
     bool tile_culling = true;         ///< tile_culling.h; off: every tile is traced against every body
-    bool coarse_steps = true;         ///< coarse to fine if time is short; off: full resolution
 };
 
 struct FrameSettings {

@@ -6,7 +6,7 @@
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/camera_image.h"
-#include "renderer/integrator/subpixel_bodies.h"
+#include "renderer/frame/subpixel_bodies.h"
 #include "renderer/material/texture_lookup.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/support/allocation_counter.h"

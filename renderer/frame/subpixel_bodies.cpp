@@ -1,4 +1,4 @@
-#include "renderer/integrator/subpixel_bodies.h"
+#include "renderer/frame/subpixel_bodies.h"
 
 #include <algorithm>
 #include <cmath>

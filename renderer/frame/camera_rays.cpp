@@ -1,4 +1,6 @@
-#include "renderer/frame/camera_batch.h"
+#include "renderer/frame/camera_rays.h"
+
+#include <cassert>
 
 #include "base/each_isa.h"
 #include "renderer/camera/lens.h"
@@ -14,7 +16,7 @@ namespace {
 using Points = BatchSampler::Points;
 
 BatchSampler sampler_of(const Frame& f, const CameraSamples& s) noexcept {
-    return {f.settings.seed, f.settings.frame, s.n, s.number, s.sample};
+    return {f.transport.seed, f.transport.frame, s.n, s.number, s.sample};
 }
 
 struct ImagePoints {
@@ -76,13 +78,16 @@ constexpr std::uint32_t kPathsOwn = 2;
 
 /// Aims the camera rays. Points on the Sun are chosen only if it is the only light or is sampled separately; paths
 /// choose their own.
-void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, CameraBatch& p) noexcept {
-    const bool sun = f.sun && (f.sun_only || f.separate_sun);
+void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, TracedRays& p) noexcept {
+    const bool sun = f.sun && f.parts != LightParts::path;
     p.rays.n = s.n;
     if (s.centre && f.one_sample()) {
         aim_at_centres(f, s, p.rays);
-        if (f.sun_only && sun) p.to_sun.fill(f.sun->centre());
-        if (f.sun_only || !sun) return;
+        if (!sun) return;
+        if (f.parts == LightParts::direct) {
+            p.to_sun.fill(f.sun->centre());
+            return;
+        }
         Points u;
         next_points(f, s, kPathsOwn, u);
         aim_at_sun(*f.sun, u[2], u[3], p.to_sun);
@@ -114,33 +119,35 @@ void move_to_times(const Frame& f, const CameraSamples& s, const Lanes<double>& 
     }
 }
 
-void aim(const Frame& f, const CameraSamples& s, CameraBatch& p) noexcept {
-    aim_at_mid_exposure(f, s, p);
-    if (!f.over_time) return;
-    Points u;
-    if (s.centre && f.one_sample())
-        u[0] = kMidExposureLanes;
-    else
-        next_points(f, s, kTimeGroup, u);
-    move_to_times(f, s, u[0], p.rays);
-}
-
 }  // namespace
 
-void trace_rays(const Frame& f, const CameraSamples& s, std::span<const std::uint32_t> bodies, CameraBatch& p) {
+void aim_rays(const Frame& f, const CameraSamples& s, TracedRays& p) {
+    assert(s.n <= kLanes);
     PhaseClock clock(p.times);
-    aim(f, s, p);
+    aim_at_mid_exposure(f, s, p);
+    if (f.over_time) {
+        Points u;
+        if (s.centre && f.one_sample())
+            u[0] = kMidExposureLanes;
+        else
+            next_points(f, s, kTimeGroup, u);
+        move_to_times(f, s, u[0], p.rays);
+    }
     p.number = s.number;
     p.sample = s.sample;
     clock.ends(Phase::aim);
+}
+
+void find_first_hits(const Frame& f, std::span<const std::uint32_t> bodies, TracedRays& p) {
+    PhaseClock clock(p.times);
     f.tracer.intersect(f.at, p.rays, bodies, p.hits);
-    p.rays_traced += s.n;
+    p.rays_traced += p.rays.n;
     if (f.subpixel_bodies.any())
-        for (std::size_t i = 0; i < s.n; ++i) p.hits.put(i, f.subpixel_bodies.beyond(p.rays[i], p.hits[i]));
+        for (std::size_t i = 0; i < p.rays.n; ++i) p.hits.put(i, f.subpixel_bodies.beyond(p.rays[i], p.hits[i]));
     clock.ends(Phase::rays);
 }
 
-void trace_centres(const Frame& f, const CameraSamples& s, CameraBatch& p) {
+void trace_centres(const Frame& f, const CameraSamples& s, TracedRays& p) {
     p.rays.n = s.n;
     aim_at_centres(f, s, p.rays);
     if (f.over_time) move_to_times(f, s, kMidExposureLanes, p.rays);

@@ -1,0 +1,96 @@
+/// renderer/frame/tuning.h - the constants of this folder that were chosen by measurement.
+///
+/// Unless a constant says otherwise, it was tuned with `narpa-bench render --scenes` on craft, craft-paths,
+/// docking, docking-contact and cornell (docs/performance.md), for the least error at equal cost. craft-and-ball
+/// was not used for tuning. None of them changes the mean of an image.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace narpa::tuning {
+
+// Passes of a frame within a budget.
+
+/// Samples per pixel that set the footprint for texture filtering. Centres are sampled as in a frame of two
+/// samples, so that each takes its own point of the lens and of the Sun, and shows defocus and penumbrae.
+inline constexpr int kCentreFootprint_spp = 2, kSampleFootprint_spp = 4;
+
+/// Fractions of the remaining time for the first pass beyond one sample per pixel, short so that there soon is an
+/// image to show, and for each later pass. Real-time runs of docking.
+inline constexpr double kFirstPassTime = 1.0 / 3, kNextPassTime = 0.85;
+/// The same for sunlight samples, whose cost varies more: a pass that is given up loses all of its time.
+inline constexpr double kSunlightPassTime = 0.7;
+/// Fractions of the remaining rays. With Sun-only direct lighting the number of samples predicts the number of rays
+/// almost exactly (docking); with paths it varies by a tenth from one pass to the next (craft-paths, cornell).
+inline constexpr double kFirstPassRays = 0.85, kNextPassRays = 0.96, kNextPassRaysOfPaths = 0.9;
+/// A remainder below this fraction of the budget is not worth another pass.
+inline constexpr double kMinRemainder = 0.05;
+
+/// Largest fraction of the remaining rays that one sample per pixel may be expected to take; the expectation comes
+/// from the pilot pass, a sixteenth of the tiles. craft-paths.
+inline constexpr double kMaxPilotPrediction = 0.85;
+/// A coarse image takes two rays for one pixel in 4 x 4, and more for those at the edges: a ray for this many
+/// pixels.
+inline constexpr std::uint64_t kPixelsPerCoarseRay = 4;
+
+/// Separate direct sunlight gets samples of its own, with this fraction of the budget, if the budget has this many
+/// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate. craft-paths at 256 x
+/// 256: RMSE 2.336 -> 1.974 at 16 rays per pixel, 0.977 -> 0.880 at 64; with less than 20 rays per pixel in view no
+/// gain.
+inline constexpr double kSunlightPart = 0.22;
+inline constexpr double kMinRaysForSunlight = 20, kMinSamplesForSunlight = 6;
+inline constexpr double kMinSeparate = 0.5;
+
+/// Time reserved for waking the threads and for a preempted one: the larger of kMinSlack_ns and 1/kSlackPart of the
+/// budget. Runs of docking on two cores beside other load.
+inline constexpr std::int64_t kMinSlack_ns = 300'000, kSlackPart = 40;
+
+// Prediction of a pass's wall time (pass_costs.h), runs of docking beside other load.
+
+/// ns per pixel or sample of each kind of pass before any measurement: centres, plan, samples, sunlight, show.
+inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10};
+/// After a skipped pass the estimate falls by this factor, to no less than this fraction of the last measurement.
+inline constexpr double kSkippedDecay = 0.95, kMinDecayed = 0.25;
+/// Weight of a new measurement, which counts as within this factor of the estimate.
+inline constexpr double kNewWeight = 0.3, kMaxChange = 2;
+/// The time of smaller passes is mostly that of their start and end: an upper bound only.
+inline constexpr std::uint64_t kMinPieces = 1000;
+
+// Work of a pass.
+
+/// Tiles per task.
+inline constexpr std::size_t kTilesPerTask = 8;
+/// Batches between two clock reads.
+inline constexpr std::uint32_t kBatchesPerClockRead = 16;
+/// With this many tiles or more, the error of a frame of centres is estimated from a tenth of them: on craft at
+/// 1024 x 1024 it then differs by 3 % from that of all tiles.
+inline constexpr std::size_t kManyTiles = 4096;
+/// PathSettings::first_survival if edges cause most of the error: in frames of one sample per pixel, and if paths
+/// are traced from all samples. craft-paths.
+inline constexpr float kReducedSurvival = 0.5f;
+
+// Adaptive sample plan (sample_plan.h): craft, docking, docking-contact.
+
+/// Edges move by less than a pixel, and centres often miss thin parts: pixels next to an edge get this fraction of
+/// its variance, and the next ones that.
+inline constexpr float kVarianceBesideEdge = 0.05f, kVarianceTwoFromEdge = 0.01f;
+/// Smallest weight of a pixel that differs from its neighbours, relative to a typical edge's. Pixels in completely
+/// uniform regions, such as empty space, get an eighth of it.
+inline constexpr double kMinWeight = 1.0 / 128;
+/// A pixel whose centre hit nothing gets kMinWeight times two to this power: a body's bounds are in view, so thin
+/// parts may pass between the centres, and a search costs one ray and no shading.
+inline constexpr int kEmptyDoublings = 2;
+/// An edge of little contrast may hide a glint that no centre met: this fraction of a typical variance is assumed.
+inline constexpr float kHiddenVariance = 0.02f;
+/// Exponent of the variance of edges, which falls as n^-1.5, beside that of noise, which falls as 1/n: the weights
+/// are the powers 2/5 and 1/2 of the variances of one sample.
+inline constexpr double kEdgePower = 0.8;
+
+// Estimates of variance.
+
+/// Variance of a tile: its ratio to that of independent samples counts as if this many more pixels had a ratio of
+/// 1, because the steps of a few pixels may be small by chance.
+inline constexpr double kPixelsAsIndependent = 4;
+
+}  // namespace narpa::tuning

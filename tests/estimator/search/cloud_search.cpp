@@ -14,7 +14,7 @@ namespace {
 constexpr RangeNoise kSweepNoise{0.02, 5.1e-5};
 const ApparentMotion kDrift{{0.05, -0.02, 0.04}, {0.01, 0.005, -0.015}};
 
-void append_box(Mesh& m, const Vec3& size_m, const Rigid3& T) {
+void add_box(Mesh& m, const Vec3& size_m, const Rigid3& T) {
     const auto first = static_cast<std::uint32_t>(m.positions.size());
     const Mesh part = test::box(size_m.x, size_m.y, size_m.z);
     for (const Vec3f& p : part.positions) m.positions.push_back(vec_cast<float>(T * vec_cast<double>(p)));
@@ -25,9 +25,9 @@ void append_box(Mesh& m, const Vec3& size_m, const Rigid3& T) {
 /// A bus with two unlike panels and a mast.
 Mesh satellite() {
     Mesh m = test::box(1.5, 1, 1);
-    append_box(m, {0.75, 1.7, 0.05}, {exp_rotation({0, 0.4, 0}), {0.15, 1.4, 0}});
-    append_box(m, {0.75, 1.2, 0.05}, {exp_rotation({0, -0.3, 0}), {-0.1, -1.1, 0.1}});
-    append_box(m, {0.15, 0.15, 1.2}, {{}, {-0.5, 0.3, 0.9}});
+    add_box(m, {0.75, 1.7, 0.05}, {exp_rotation({0, 0.4, 0}), {0.15, 1.4, 0}});
+    add_box(m, {0.75, 1.2, 0.05}, {exp_rotation({0, -0.3, 0}), {-0.1, -1.1, 0.1}});
+    add_box(m, {0.15, 0.15, 1.2}, {{}, {-0.5, 0.3, 0.9}});
     return m;
 }
 

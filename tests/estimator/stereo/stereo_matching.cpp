@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 constexpr int kSize = 240;
 constexpr double kFocal_px = 600;
 
-Camera camera() {
+Camera stereo_camera() {
     Camera c;
     c.width = c.height = kSize;
     c.fx = c.fy = kFocal_px, c.cx = c.cy = (kSize - 1) / 2.0;
@@ -88,7 +88,8 @@ struct Views {
     StereoPair pair;
     MeasuredImage left, right;
 };
-Views views(const Rigid3& T_right_left, const Paint& paint, const Plane& plane = {}, const Camera& c = camera()) {
+Views views(const Rigid3& T_right_left, const Paint& paint, const Plane& plane = {},
+            const Camera& c = stereo_camera()) {
     return {{c, c, T_right_left}, picture(c, {}, plane, paint), picture(c, inverse(T_right_left), plane, paint)};
 }
 
@@ -156,7 +157,7 @@ std::string name_of(const testing::TestParamInfo<Rigid3>& at) {
 INSTANTIATE_TEST_SUITE_P(Baselines, StereoMatching, testing::Values(kAside, kAbove, kDown, kTurned), name_of);
 
 TEST(StereoMatcher, MatchesThroughLensesThatDistort) {
-    Camera barrel = camera();
+    Camera barrel = stereo_camera();
     barrel.model = distorted(pinhole_of(barrel), {Distortion::Model::opencv, {-0.8, 0.4, 2e-3, -1e-3}});
     Views v = views(kTurned, waves(), {}, barrel);
     add_noise(barrel, 1, v.left), add_noise(barrel, 2, v.right);
@@ -304,7 +305,7 @@ TEST(SplineImage, PassesThroughThePixelsWithItsSlope) {
 }
 
 TEST(EpipolarWarp, FollowsThePointAlongTheLine) {
-    Camera from = camera(), to = camera();
+    Camera from = stereo_camera(), to = stereo_camera();
     to.fx = 500, to.fy = 550, to.cx = 100;
     const EpipolarWarp warp(pinhole_of(from), pinhole_of(to), kTurned);
     const Vector2d left(30, 190);

@@ -11,11 +11,11 @@
 namespace narpa {
 namespace {
 
-constexpr int kWidth = 128, kHeight = 96;
+constexpr int kWidth_px = 128, kHeight_px = 96;
 
 Camera camera_with(PixelFormat format, bool detector) {
     Camera c;
-    c.width = kWidth, c.height = kHeight;
+    c.width = kWidth_px, c.height = kHeight_px;
     c.fx = c.fy = 200, c.cx = 63.5, c.cy = 47.5;
     c.format = format;
     c.white_radiance = 250;
@@ -62,7 +62,7 @@ TEST_P(EveryFormat, MeanAndVarianceAreTheDetectors) {
         const Rgb light{level, level, level};
         const Moments seen = moments(frame_of(camera, light));
         const double expected = model.dn(light), variance = model.variance_dn2(expected);
-        constexpr double kPixels = kWidth * kHeight;
+        constexpr double kPixels = kWidth_px * kHeight_px;
         // Truncation to eight bits is in the variance, and may shift the mean by a fraction of its step.
         EXPECT_NEAR(seen.mean, expected,
                     5 * std::sqrt(variance / kPixels) + 0.1 * std::sqrt(12 * model.rounding_dn2))
@@ -86,12 +86,12 @@ TEST_P(EveryFormat, ExpectedSignalIsThatOfAFrameWithoutNoise) {
     camera.detector->read_noise_e = 0, camera.detector->shot_noise = false;
     camera.embedded_line = true;
     RadianceImage light(camera.width, camera.height);
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x)
-            light.pixels[static_cast<std::size_t>(y * kWidth + x)] = {
+    for (int y = 0; y < kHeight_px; ++y)
+        for (int x = 0; x < kWidth_px; ++x)
+            light.pixels[static_cast<std::size_t>(y * kWidth_px + x)] = {
                 static_cast<float>(20 + 15 * std::sin(x)), static_cast<float>(30 + 10 * std::cos(y)),
                 static_cast<float>(25 + 20 * std::sin(x + 2 * y))};
-    std::vector<std::uint8_t> bytes(frame_bytes({kWidth, kHeight, camera.format, camera.period_ns}));
+    std::vector<std::uint8_t> bytes(frame_bytes({kWidth_px, kHeight_px, camera.format, camera.period_ns}));
     expose(camera, light, 5, 3, bytes);
     const auto frame = measured_image(camera, bytes);
     ASSERT_TRUE(frame);
@@ -116,8 +116,8 @@ TEST(MeasuredImage, NoiseModelHasDarkCurrentPrnuAndDsnu) {
         const Rgb light{level, level, level};
         const Moments seen = moments(frame_of(camera, light));
         const double expected = model.dn(light), variance = model.variance_dn2(expected);
-        EXPECT_NEAR(seen.mean, expected, 5 * std::sqrt(variance / (kWidth * kHeight))) << level;
-        EXPECT_NEAR(seen.variance / variance, 1, 5 * std::sqrt(2.0 / (kWidth * kHeight))) << level;
+        EXPECT_NEAR(seen.mean, expected, 5 * std::sqrt(variance / (kWidth_px * kHeight_px))) << level;
+        EXPECT_NEAR(seen.variance / variance, 1, 5 * std::sqrt(2.0 / (kWidth_px * kHeight_px))) << level;
     }
 }
 
@@ -144,7 +144,7 @@ TEST(MeasuredImage, IdealSensorsAreLinearUpToWhite) {
 TEST(MeasuredImage, LeavesTheEmbeddedLineOut) {
     Camera camera = camera_with(PixelFormat::grey, false);
     camera.embedded_line = true;
-    EXPECT_EQ(frame_of(camera, {1, 1, 1}).height, kHeight - 1);
+    EXPECT_EQ(frame_of(camera, {1, 1, 1}).height, kHeight_px - 1);
 }
 
 TEST(MeasuredImage, RefusesOtherSizes) {

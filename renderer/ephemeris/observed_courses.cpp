@@ -66,8 +66,7 @@ private:
         const GroundObserver observer = at_start_.after(t_s);
         const Vec3 forward = direction_(observer, t_s), right = cross(forward, observer.zenith());
         const Vec3 x = norm(right) > 1e-6 ? normalized(right) : observer.east();
-        return {quat_from_columns(x, cross(forward, x), forward),
-                observer.position_m()};
+        return {quat_from_columns(x, cross(forward, x), forward), observer.position_m()};
     }
 
     GroundObserver at_start_;

@@ -32,7 +32,7 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const bool sun_only = direct && SunDirectLighting::suffices(render_scene);
     const bool separate_sun = !direct && on.separate_sun && sun_alone_lights_first_surfaces(render_scene);
     const Integrator& by_waves = direct ? static_cast<const Integrator&>(kDirectIntegrator) : kPathIntegrator;
-    const CameraModelHandle model(camera);
+    const CameraModel* const model = camera.model.get();
     return {render_scene,
             tracer,
             at,

@@ -8,7 +8,7 @@
 #include "base/write_file.h"
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/assets/calibration_file.h"
-#include "renderer/camera/scene_camera.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa::cli {
 namespace {
@@ -20,16 +20,15 @@ nlohmann::json mounting(const Scene& scene, int mount, const Rigid3& T) {
 }
 
 nlohmann::json describe(const Scene& scene, const Camera& c) {
-    const bool is_fisheye = c.distortion && c.distortion->model == Distortion::Model::fisheye;
-    nlohmann::json camera{
-        {"name", c.name},
-        {"width", c.width},
-        {"height", c.height},
-        {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
-        {"format", std::string(name(c.format))},
-        {"camera_matrix", {{c.fx, 0, c.cx}, {0, c.fy, c.cy}, {0, 0, 1}}},
-        {"distortion_model", is_fisheye ? "fisheye" : "opencv"},
-        {"distortion_coefficients", c.distortion ? c.distortion->coefficients : std::vector<double>(5)}};
+    const auto [kind, p, coefficients] = opencv_parameters(*c.model);
+    nlohmann::json camera{{"name", c.name},
+                          {"width", c.width},
+                          {"height", c.height},
+                          {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
+                          {"format", std::string(name(c.format))},
+                          {"camera_matrix", {{p.fx, 0, p.cx}, {0, p.fy, p.cy}, {0, 0, 1}}},
+                          {"distortion_model", std::string(kind->opencv)},
+                          {"distortion_coefficients", coefficients}};
     camera.update(mounting(scene, c.mount, c.T_mount_camera));
     return camera;
 }
@@ -41,10 +40,6 @@ nlohmann::json describe(const Scene& scene, const Lidar& l) {
                          {"range_max_m", l.range_max_m}};
     lidar.update(mounting(scene, l.mount, l.T_mount_lidar));
     return lidar;
-}
-
-Calibration calibration_of(const Camera& c) {
-    return {c.width, c.height, pinhole_of(c), c.distortion};
 }
 
 }  // namespace
@@ -60,10 +55,10 @@ Status write_calibration(const Scene& scene, const std::string& folder) {
         {"cameras", nlohmann::json::array()},
         {"lidars", nlohmann::json::array()}};
     for (const Camera& c : scene.cameras) {
+        const Result<std::string> text = calibration_text(c.name, {c.width, c.height, c.model});
+        if (!text) return text.error();
         document["cameras"].push_back(describe(scene, c));
-        if (Status good = write_file(folder + "/" + c.name + ".yaml", calibration_text(c.name, calibration_of(c)));
-            !good)
-            return good;
+        if (Status good = write_file(folder + "/" + c.name + ".yaml", *text); !good) return good;
     }
     for (const Lidar& l : scene.lidars) document["lidars"].push_back(describe(scene, l));
     return write_file(folder + "/calibration.json", document.dump(2) + "\n");

@@ -201,11 +201,11 @@ std::size_t stars_in_view(const World& world, const Camera& camera) {
     BodyPoses at(world.scene().bodies.size());
     world.place(0, camera.mount, at);
     const Quat q_icrs_camera = field.q_icrs_world * world.camera_pose(camera, 0, at).q;
-    const CameraModelHandle model(camera);
+    const CameraModel& model = *camera.model;
     return static_cast<std::size_t>(std::ranges::count_if(field.stars, [&](const Star& star) {
-        const auto p = model->project(conjugate(q_icrs_camera) * star.direction);
+        const auto p = model.project(conjugate(q_icrs_camera) * star.direction);
         return p && p->x > -0.5 && p->x < camera.width - 0.5 && p->y > -0.5 && p->y < camera.height - 0.5 &&
-               model->sees(*p);
+               model.sees(*p);
     }));
 }
 
@@ -263,12 +263,12 @@ SelfOcclusion self_occlusion(const World& world, int mount, const Rigid3& T_moun
 /// A grid over the image.
 std::vector<Ray> rays_of(const Camera& c) {
     constexpr int kAcross = 64, kDown = 48;
-    const CameraModelHandle model(c);
+    const CameraModel& model = *c.model;
     std::vector<Ray> rays;
     for (int j = 0; j < kDown; ++j)
         for (int i = 0; i < kAcross; ++i)
             rays.push_back({{},
-                            normalized(model->direction(
+                            normalized(model.direction(
                                 {(i + 0.5) / kAcross * c.width - 0.5, (j + 0.5) / kDown * c.height - 0.5}))});
     return rays;
 }

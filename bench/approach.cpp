@@ -35,7 +35,7 @@ BodyPoses at_time_0(const World& world) {
 /// The camera as the estimators know it: without the ignored properties.
 Camera without(const std::vector<std::string>& ignored, Camera camera) {
     for (const std::string& what : ignored) {
-        if (what == "distortion") camera.model = nullptr;
+        if (what == "distortion") camera.model = std::make_shared<const Pinhole>(paraxial_pinhole(*camera.model));
         if (what == "rows" && camera.shutter) camera.shutter->row_time_ns = 0;
         if (what == "shutter") camera.shutter.reset();
         if (what == "psf") camera.point_spread.reset();

@@ -15,7 +15,7 @@
 #include "estimator/search/template_matcher.h"
 #include "protocols/lidar/velodyne.h"
 #include "renderer/camera/detector.h"
-#include "renderer/projection/distortion.h"
+#include "renderer/projection/brown_conrady.h"
 #include "tracking/estimate_report.h"
 
 namespace narpa {
@@ -75,7 +75,8 @@ struct WorldErrors {
         for (Material& m : s.materials) m.diffuse = static_cast<float>(brightness) * m.diffuse;
         if (s.sun) s.sun->direction = exp_rotation(sun_rad) * s.sun->direction;
         Camera& c = s.cameras.front();
-        c.fx *= focal, c.fy *= focal;
+        const Pinhole p = paraxial_pinhole(*c.model);
+        c.model = std::make_shared<const Pinhole>(p.fx * focal, p.fy * focal, p.cx, p.cy);
         return s;
     }
     /// The pose in the true sensor axes at the true time, for a target whose pose in the assumed axes at the
@@ -202,8 +203,8 @@ private:
         Camera exposing = camera;
         if (condition == "blurred") exposing.point_spread = PointSpreadFunction{.sigma_px = d.uniform(0.5, 2)};
         if (world.distortion != 0)
-            exposing.model = distorted(Pinhole{camera.fx, camera.fy, camera.cx, camera.cy},
-                                       {Distortion::Model::opencv, {world.distortion, 0, 0, 0}});
+            exposing.model =
+                make_projection({&kBrownConrady, paraxial_pinhole(*camera.model), {world.distortion, 0, 0, 0}});
         const BodyPoses at(1);
         ModelView view(differs ? *differs : shown.render_scene, exposing, 0, at);
         FrameSettings s;
@@ -298,7 +299,7 @@ private:
                               world.focal * believed.fy * p.y / p.z + believed.cy + noise * d.normal()});
             if (condition == "bright" && i % 5 == 4) pixels.back() = {d.uniform(0, 500), d.uniform(0, 500)};
         }
-        const PnpInput input{believed, body, pixels, sigma_px};
+        const PnpInput input{&believed, body, pixels, sigma_px};
         const PnpSolution& s = solver_.solve(input, condition == "bright");
         if (!s.ok()) return {s.answer()};
         const Matrix6 by_model = covariance_by(

@@ -189,8 +189,7 @@ Result<Scene> consistency_scene(std::string_view target, int size) {
     Camera c;
     c.name = "camera";
     c.width = c.height = size;
-    c.fx = c.fy = 1.6 * size;
-    c.cx = c.cy = 0.5 * (size - 1);
+    c.model = std::make_shared<const Pinhole>(1.6 * size, 1.6 * size, 0.5 * (size - 1), 0.5 * (size - 1));
     c.format = PixelFormat::y16;
     c.detector = Detector{.exposure_s = 3e-5,
                           .pixel_pitch_m = 5e-6,

@@ -85,7 +85,7 @@ std::optional<PnpTrial> draw_trial(const PnpSetting& s, std::mt19937_64& random)
         trial.pixels.push_back(pixel);
     }
     const auto bound = pnp_bound(
-        {trial.camera, {trial.body_m.data(), trial.inliers}, {trial.pixels.data(), trial.inliers}, trial.sigma_px},
+        {&trial.camera, {trial.body_m.data(), trial.inliers}, {trial.pixels.data(), trial.inliers}, trial.sigma_px},
         trial.T_camera_body);
     if (!bound) return std::nullopt;
     trial.bound_rotation_rad = rotation_sigma(*bound);

@@ -37,7 +37,7 @@ struct PnpTrial {
     /// The Cramer-Rao bound of the inliers: roots of the summed variances of rotation and position.
     double bound_rotation_rad = 0, bound_position_m = 0;
 
-    [[nodiscard]] PnpInput input() const { return {camera, body_m, pixels, sigma_px}; }
+    [[nodiscard]] PnpInput input() const { return {&camera, body_m, pixels, sigma_px}; }
 };
 
 /// None where the points do not determine the pose or lie behind the camera: draw again.

@@ -14,11 +14,15 @@ constexpr std::size_t kPointsMax = 1024;
 
 // OpenCV's methods
 
+cv::Mat matrix_of(const Pinhole& p) {
+    return (cv::Mat_<double>(3, 3) << p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1);
+}
+
 struct CvTrial {
     cv::Mat K, points, pixels;
 
     explicit CvTrial(const PnpTrial& t)
-        : K((cv::Mat_<double>(3, 3) << t.camera.fx, 0, t.camera.cx, 0, t.camera.fy, t.camera.cy, 0, 0, 1)),
+        : K(matrix_of(t.camera)),
           points(static_cast<int>(t.body_m.size()), 1, CV_64FC3, const_cast<Vec3*>(t.body_m.data())),
           pixels(static_cast<int>(t.pixels.size()), 1, CV_64FC2, const_cast<Pixel*>(t.pixels.data())) {}
 };
@@ -79,7 +83,7 @@ struct Residuals {
 
     const PnpTrial& trial;
     Quat start;
-    CameraModelHandle camera{trial.camera};
+    const CameraModel* camera = &trial.camera;
 
     [[nodiscard]] int NumResiduals() const { return 2 * static_cast<int>(trial.body_m.size()); }
     [[nodiscard]] Rigid3 pose(const double* x) const {

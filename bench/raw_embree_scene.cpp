@@ -46,7 +46,7 @@ Result<RawScene> RawScene::build(const Scene& scene, const BodyPoses& at) {
 }
 
 RawAim::RawAim(const Camera& c, const Rigid3& T) : origin(vec_cast<float>(T.t)) {
-    const auto [at_zero, per_x, per_y] = pinhole_of(c).rays(T.q);
+    const auto [at_zero, per_x, per_y] = paraxial_pinhole(*c.model).rays(T.q);
     across = vec_cast<float>(per_x), down = vec_cast<float>(per_y), ahead = vec_cast<float>(at_zero);
 }
 

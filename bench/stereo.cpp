@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 constexpr double kNearestPart = 0.75, kFarthestPart = 1.5;
 
 Vector3d direction(const Camera& c, const Vector2d& px) {
-    return to_eigen(CameraModelHandle(c)->on_plane({px.x(), px.y()}));
+    return to_eigen(c.model->on_plane({px.x(), px.y()}));
 }
 
 /// One of the two cameras, and its frame at time 0.
@@ -126,7 +126,8 @@ Result<StereoBench> measure_stereo(const Scene& scene, int points,
     const Camera& camera = l.unit.camera();
     out.pair = {camera, r.unit.camera(), inverse(r.T_world_camera) * l.T_world_camera};
 
-    const auto middle = l.surface({camera.cx, camera.cy});
+    const Pinhole p = paraxial_pinhole(*camera.model);
+    const auto middle = l.surface({p.cx, p.cy});
     if (!middle)
         return Error{"the middle of the left frame sees no surface, expected ground to measure from", scene.file};
     auto left_frame = l.frame();

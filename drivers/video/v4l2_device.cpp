@@ -10,21 +10,11 @@ namespace narpa {
 namespace {
 
 std::uint32_t fourcc(PixelFormat pixel) noexcept {
-    switch (pixel) {
-        case PixelFormat::grey: return V4L2_PIX_FMT_GREY;
-        case PixelFormat::y16: return V4L2_PIX_FMT_Y16;
-        case PixelFormat::yuyv: return V4L2_PIX_FMT_YUYV;
-        case PixelFormat::rgb24: return V4L2_PIX_FMT_RGB24;
-        case PixelFormat::rggb8: return V4L2_PIX_FMT_SRGGB8;
-        case PixelFormat::grbg8: return V4L2_PIX_FMT_SGRBG8;
-        case PixelFormat::gbrg8: return V4L2_PIX_FMT_SGBRG8;
-        case PixelFormat::bggr8: return V4L2_PIX_FMT_SBGGR8;
-        case PixelFormat::rggb16: return V4L2_PIX_FMT_SRGGB16;
-        case PixelFormat::grbg16: return V4L2_PIX_FMT_SGRBG16;
-        case PixelFormat::gbrg16: return V4L2_PIX_FMT_SGBRG16;
-        case PixelFormat::bggr16: return V4L2_PIX_FMT_SBGGR16;
-    }
-    return 0;
+    std::uint32_t code = 0;
+    for (int i = 0; i < 4; ++i)
+        code |= std::uint32_t{static_cast<std::uint8_t>(row_of(pixel).v4l2[static_cast<std::size_t>(i)])}
+                << (8 * i);
+    return code;
 }
 
 // The number in /dev/videoN, or 10.

@@ -128,7 +128,7 @@ std::span<const PixelDerivative> ImageDerivative::at(const Rigid3& T_camera_targ
                             (norm(motion_.velocity_m_s) +
                              norm(motion_.rate_rad_s) * render_scene_.tracer().bounding_radius_m(target_)) /
                             range_m;
-    const double blur_px = blur_rad * CameraModelHandle(camera_)->pixels_per_radian();
+    const double blur_px = blur_rad * camera_.model->pixels_per_radian();
     const int parts = static_cast<int>(std::clamp(std::ceil(kPartsPerPixel * blur_px), 1.0, kMaxParts));
     (void)place_camera(T_camera_target, camera_, target_, at_);
     std::ranges::fill(derivative_, PixelDerivative(PixelDerivative::Zero()));

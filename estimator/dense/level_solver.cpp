@@ -41,7 +41,7 @@ bool is_pose(const Rigid3& T) {
 LevelSolver::LevelSolver(const Camera& camera, const RenderScene& render_scene, std::size_t target, int factor,
                          LevelView& view, const DenseOptions& options, DenseEstimate& estimate)
     : camera_(camera),
-      pixels_per_radian_(CameraModelHandle(camera)->pixels_per_radian()),
+      pixels_per_radian_(camera.model->pixels_per_radian()),
       render_scene_(render_scene),
       target_(target),
       view_(view),

@@ -61,13 +61,12 @@ Window joined(const Window& a, const Window& b) {
 std::optional<Window> window_about(const Tracer& tracer, const Camera& camera, std::size_t target,
                                    const Rigid3& T_camera_target) {
     const Window whole{0, 0, camera.width, camera.height};
-    const CameraModelHandle model(camera);
     const auto corners = outline(tracer.bounds(target), T_camera_target);
     if (!corners) return whole;
     double left = kInfinity, right = -kInfinity, top = kInfinity, bottom = -kInfinity;
     std::size_t without_image = 0;
     for (const Vec3& corner : *corners) {
-        const auto p = model->project(corner);
+        const auto p = camera.model->project(corner);
         if (!p)
             ++without_image;
         else

@@ -28,7 +28,7 @@ void halve_interval(Contour& c, int body, double here_m) {
 }  // namespace
 
 Ray ray_through(const Frame& f, double x, double y) {
-    return camera_ray(f.model, f.pose.at(f.pose.time(y, f.camera.height, 0.5)), x, y);
+    return camera_ray(f.camera, f.pose.at(f.pose.time(y, f.camera.height, 0.5)), x, y);
 }
 
 void aim_through(const Frame& f, const Lanes<double>& x, const Lanes<double>& y, RayBatch& rays) {

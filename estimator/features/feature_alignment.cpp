@@ -109,7 +109,7 @@ void FeatureAlignment::set_detector(const Detector& detector) {
 /// True if the rays of lanes 1 to 4 meet the surface that lane 0 meets.
 bool FeatureAlignment::on_smooth_surface(const HitBatch& hits) const {
     const Hit hit = hits[0];
-    const double step_m = kStep_px * hit.range_m / CameraModelHandle(view_.camera())->pixels_per_radian();
+    const double step_m = kStep_px * hit.range_m / view_.camera().model->pixels_per_radian();
     for (std::size_t i = 1; i < 5; ++i) {
         if (hits.body[i] != hit.body) return false;
         const Vec3 between = hits.position[i] - hit.position;
@@ -210,7 +210,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
 Matrix6 FeatureAlignment::response(const ModelMatches& points, const ByteScale& scale,
                                    const FrameSettings& settings, const Rigid3& T_camera_target,
                                    const Matrix6& covariance, double floor_px) {
-    const std::vector<Matrix26> jacobians = points.jacobians(*CameraModelHandle(view_.camera()), T_camera_target);
+    const std::vector<Matrix26> jacobians = points.jacobians(*view_.camera().model, T_camera_target);
     const ByteImage here = scale.scaled(view_.radiance());
     const auto shown = [&](int, const Vector6& motion) -> Vector6 {
         double squares = 0;
@@ -227,7 +227,7 @@ PoseShifts FeatureAlignment::shifts_by_light(const ModelMatches& points, const B
                                              const FrameSettings& settings, const Rigid3& T_camera_target,
                                              const BodyPoses& at, const ApparentMotion& motion, double floor_px) {
     PoseShifts shifts(6, 3);
-    const std::vector<Matrix26> jacobians = points.jacobians(*CameraModelHandle(view_.camera()), T_camera_target);
+    const std::vector<Matrix26> jacobians = points.jacobians(*view_.camera().model, T_camera_target);
     view_.render(T_camera_target, settings, false);
     const ByteImage here = scale.scaled(view_.radiance());
     for (int axis = 0; axis < 3; ++axis) {
@@ -287,8 +287,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     FeatureEstimate estimate;
     estimate.T_camera_target = guess;
     view_.begin_frame(at, motion, times_);
-    const CameraModelHandle model(view_.camera());
-    const CameraModel& camera = *model;
+    const CameraModel& camera = *view_.camera().model;
     const ByteScale scale(frame, sensor_);
     const ByteImage frame_bytes = scale.scaled(frame);
     FrameSettings render_settings;
@@ -313,7 +312,7 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
             const std::vector<PixelCovariance> covariances = points.covariances(floor_px);
             RefineOptions options;
             options.loss.kind = loss;
-            const PnpInput input{model, points.body_m, points.pixels, 1, covariances};
+            const PnpInput input{&camera, points.body_m, points.pixels, 1, covariances};
             return PnpFit(refiner.refine(input, estimate.T_camera_target, options));
         };
         const std::vector<double> before = points.residuals_px(camera, estimate.T_camera_target);
@@ -373,9 +372,9 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         estimate.by_light = shifts_by_light(points, scale, render_settings, T_of_view, at, motion, floor_px);
     const std::vector<PixelCovariance> as_weighed = points.covariances(floor_px), of_noise = points.covariances(0);
     estimate.by_focal =
-        shift_by_focal({model, points.body_m, points.pixels, 1, as_weighed}, estimate.T_camera_target);
+        shift_by_focal({&camera, points.body_m, points.pixels, 1, as_weighed}, estimate.T_camera_target);
     estimate.bound =
-        refiner.refine({model, points.body_m, points.pixels, 1, of_noise}, estimate.T_camera_target).covariance;
+        refiner.refine({&camera, points.body_m, points.pixels, 1, of_noise}, estimate.T_camera_target).covariance;
     return estimate;
 }
 

@@ -28,7 +28,7 @@ const char* to_text(PnpStatus status) {
 }
 
 PnpStatus check(const PnpInput& input) {
-    if (!input.camera->is_valid()) return PnpStatus::bad_camera;
+    if (!input.camera || !input.camera->is_valid()) return PnpStatus::bad_camera;
     if (input.body_m.size() != input.pixels.size()) return PnpStatus::sizes_differ;
     if (!input.covariance_px2.empty() && input.covariance_px2.size() != input.pixels.size())
         return PnpStatus::sizes_differ;

@@ -44,7 +44,7 @@ struct PixelCovariance {
 /// N points: body_m[i] is seen at pixels[i]. `covariance_px2`: one for each, or empty, and then sigma_px holds for
 /// u and v of all. Every pixel's ray has z > 0.
 struct PnpInput {
-    CameraModelHandle camera;
+    const CameraModel* camera = nullptr;  ///< outlives the input, as the spans do
     std::span<const Vec3> body_m;
     std::span<const Pixel> pixels;
     double sigma_px = 1;

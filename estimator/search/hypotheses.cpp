@@ -73,8 +73,7 @@ std::vector<Hypothesis> find_hypotheses(const SearchView& known, const MeasuredI
                                         const BrightRegion& region, int attitudes, int kept, int most,
                                         int& renders) {
     const FrameView view(frame);
-    const CameraModelHandle model(known.camera);
-    const Vec3 direction = normalized(model->direction({region.x, region.y}));
+    const Vec3 direction = normalized(known.camera.model->direction({region.x, region.y}));
     std::vector<Hypothesis> all;
     for (const Quat& q : attitude_grid(attitudes)) all.push_back({known.aimed(q, direction, known.range_m), 1});
     const TemplateMatcher coarse(known, view, region, kGridExtent_px, kGridSpp);

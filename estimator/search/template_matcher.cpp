@@ -46,8 +46,7 @@ double apparent_radius_m(const Tracer& tracer, std::size_t body) {
 }
 
 double SearchView::extent_px() const {
-    return 2 * apparent_radius_m(render_scene.tracer(), target) * CameraModelHandle(camera)->pixels_per_radian() /
-           range_m;
+    return 2 * apparent_radius_m(render_scene.tracer(), target) * camera.model->pixels_per_radian() / range_m;
 }
 
 Rigid3 SearchView::aimed(const Quat& q, const Vec3& direction, double distance_m) const {
@@ -184,11 +183,11 @@ Hypothesis TemplateMatcher::Worker::compare(const Rigid3& T) {
     const double gain = std::clamp(both / own, std::sqrt(kMinBrightness), std::sqrt(kMaxBrightness));
     out.misfit = 1 - (2 * gain * both - gain * gain * own) * k * k / seen.energy;
 
-    const CameraModelHandle model(m_.camera_);
+    const CameraModel& model = *m_.camera_.model;
     const Vec3 centre = T * known.render_scene.tracer().bounds(known.target).centre_m;
-    const auto at = model->project(centre);
+    const auto at = model.project(centre);
     if (!at) return {T, 1};
-    const Vec3 direction = model->direction({seen.x + k * (at->x - rendered.x), seen.y + k * (at->y - rendered.y)});
+    const Vec3 direction = model.direction({seen.x + k * (at->x - rendered.x), seen.y + k * (at->y - rendered.y)});
     out.T_camera_target = known.aimed(T.q, direction, norm(centre) / k);
     return out;
 }

@@ -37,20 +37,20 @@ Status check(const StereoPair& pair, const MeasuredImage& left, const MeasuredIm
 }
 
 Camera as_pinhole(Camera camera) {
-    camera.model = nullptr;
+    camera.model = std::make_shared<const Pinhole>(paraxial_pinhole(*camera.model));
     return camera;
 }
 
 /// The image as as_pinhole(camera) would have taken it. Pixels outside the frame are marked as saturated, so that
 /// no patch is cut there.
 MeasuredImage through_pinhole(const Camera& camera, const MeasuredImage& image) {
-    const CameraModelHandle lens(camera);
-    if (lens->pinhole() != nullptr) return image;
-    const Pinhole pinhole = pinhole_of(camera);
+    const CameraModel& lens = *camera.model;
+    if (lens.pinhole() != nullptr) return image;
+    const Pinhole pinhole = paraxial_pinhole(lens);
     cv::Mat x(image.height, image.width, CV_32F), y(image.height, image.width, CV_32F);
     for (int v = 0; v < image.height; ++v)
         for (int u = 0; u < image.width; ++u) {
-            const auto p = lens->project(pinhole.direction({1.0 * u, 1.0 * v}));
+            const auto p = lens.project(pinhole.direction({1.0 * u, 1.0 * v}));
             x.at<float>(v, u) = p ? static_cast<float>(p->x) : -1e4F;
             y.at<float>(v, u) = p ? static_cast<float>(p->y) : -1e4F;
         }
@@ -101,7 +101,7 @@ public:
     }
 
 private:
-    static Pinhole pinhole(const Camera& camera) { return *CameraModelHandle(camera)->pinhole(); }
+    static Pinhole pinhole(const Camera& camera) { return *camera.model->pinhole(); }
 
     /// Left-right consistency: the search from the right frame ends where it began in the left one.
     bool is_consistent(const WholePixelMatch& whole, const InverseDepths& range) {

@@ -22,8 +22,8 @@ constexpr int kNewtonStepsMax = 20, kHalvingsMax = 10;
 constexpr double kRounding = 1e-12;
 
 /// Direction of a pixel's ray, z = 1.
-Vector3d ray_through(const CameraModelHandle& camera, const Vector2d& px) {
-    return to_eigen(camera->on_plane({px.x(), px.y()}));
+Vector3d ray_through(const CameraModel& camera, const Vector2d& px) {
+    return to_eigen(camera.on_plane({px.x(), px.y()}));
 }
 
 /// Image of the line through the camera's centre and the point, which may be behind it; not finite if there is
@@ -37,10 +37,12 @@ Matrix23 jacobian_of_line(const CameraModel& camera, const Vector3d& p) {
     return sign * to_eigen(camera.jacobian(to_vec3(sign * p)));
 }
 
+bool is_usable(const Camera& camera) {
+    return camera.model && camera.model->is_valid();
+}
 bool is_usable(const StereoPair& pair) {
     const Rigid3& T = pair.T_right_left;
-    return CameraModelHandle(pair.left)->is_valid() && CameraModelHandle(pair.right)->is_valid() &&
-           is_finite(T.t) && std::abs(norm(T.q) - 1) < 1e-6;
+    return is_usable(pair.left) && is_usable(pair.right) && is_finite(T.t) && std::abs(norm(T.q) - 1) < 1e-6;
 }
 
 bool is_usable(const PixelMeasurement& m) {
@@ -52,8 +54,8 @@ bool is_usable(const PixelMeasurement& m) {
 class TwoViews {
 public:
     TwoViews(const StereoPair& pair, const PixelMeasurement& left, const PixelMeasurement& right)
-        : left_(pair.left),
-          right_(pair.right),
+        : left_(pair.left.model),
+          right_(pair.right.model),
           left_px_(left.px),
           right_px_(right.px),
           R_(rotation_matrix(pair.T_right_left.q)),
@@ -63,7 +65,7 @@ public:
 
     /// Point of the left ray closest to the right one, by the angle seen from the right camera.
     [[nodiscard]] Vector3d first_guess() const {
-        const Vector3d l = ray_through(left_, left_px_), r = ray_through(right_, right_px_);
+        const Vector3d l = ray_through(*left_, left_px_), r = ray_through(*right_, right_px_);
         const Vector3d turned = r.cross(R_ * l), moved = r.cross(t_);
         const double squared = moved.squaredNorm();
         return {l.x(), l.y(), squared > 0 ? -moved.dot(turned) / squared : 0};
@@ -96,7 +98,7 @@ private:
         return right_px_ - image_of_line(*right_, in_right(s));
     }
 
-    CameraModelHandle left_, right_;
+    std::shared_ptr<const CameraModel> left_, right_;
     Vector2d left_px_, right_px_;
     Matrix3d R_;
     Vector3d t_;
@@ -161,11 +163,10 @@ TriangulatedPoint triangulate(const StereoPair& pair, const PixelMeasurement& le
 Result<double> printed_depth_m(const StereoPair& pair, const Vector2d& left_px, const Vector2d& right_px) {
     if (!is_usable(pair) || !left_px.allFinite() || !right_px.allFinite())
         return Error{"a stereo pair or a pixel that is not finite, expected numbers"};
-    const Eigen::Array3d l = ray_through(pair.left, left_px);
-    const CameraModelHandle right(pair.right);
-    if (right->pinhole() == nullptr)
-        return Error{"a right camera that is not a pinhole, expected one for this formula"};
-    const double U_r = right_px.x() - right->pinhole()->cx, f_r = right->pinhole()->fx;
+    const Eigen::Array3d l = ray_through(*pair.left.model, left_px);
+    const Pinhole* right = pair.right.model->pinhole();
+    if (right == nullptr) return Error{"a right camera that is not a pinhole, expected one for this formula"};
+    const double U_r = right_px.x() - right->cx, f_r = right->fx;
     const Matrix3d R = rotation_matrix(pair.T_right_left.q);
     const Vec3& t = pair.T_right_left.t;
     const Eigen::Array3d column = f_r * R.row(0).transpose().array() * l;

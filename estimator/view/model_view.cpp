@@ -49,11 +49,10 @@ Rigid3 ModelView::T_world_camera(double row) const noexcept {
 
 void ModelView::trace_pixels(std::span<const ImagePoint> points, HitBatch& hits) const noexcept {
     assert(points.size() <= kLanes);
-    const CameraModelHandle model(camera_);
     RayBatch rays;
     rays.n = points.size();
     for (std::size_t i = 0; i < rays.n; ++i)
-        rays.put(i, camera_ray(model, T_world_camera(points[i].y), points[i].x, points[i].y));
+        rays.put(i, camera_ray(camera_, T_world_camera(points[i].y), points[i].x, points[i].y));
     tracer().intersect(at_, rays, tracer().all_bodies(), hits);
 }
 

@@ -47,9 +47,8 @@ UvcDescriptor interface_descriptor(std::uint8_t subtype) {
 
 /// The format's GUID: "YUY2", "Y16 " or "Y800", and the fixed bytes of Microsoft's media subtypes.
 std::array<std::uint8_t, 16> format_guid(PixelFormat f) {
-    const char* code = f == PixelFormat::yuyv ? "YUY2" : f == PixelFormat::y16 ? "Y16 " : "Y800";
     std::array<std::uint8_t, 16> guid{0, 0, 0, 0, 0, 0, 0x10, 0, 0x80, 0, 0, 0xaa, 0, 0x38, 0x9b, 0x71};
-    std::copy_n(code, 4, guid.begin());
+    std::ranges::copy(row_of(f).uvc, guid.begin());
     return guid;
 }
 

@@ -38,7 +38,7 @@ inline constexpr std::int64_t kUvcExposureUnit_ns = 100'000;
 inline constexpr std::uint32_t kUvcClock_hz = 48'000'000;
 
 [[nodiscard]] constexpr bool uvc_carries(PixelFormat f) noexcept {
-    return f == PixelFormat::grey || f == PixelFormat::y16 || f == PixelFormat::yuyv;
+    return !row_of(f).uvc.empty();
 }
 
 /// The configuration of a camera of one format, size and rate. `with_controls`: exposure and gain.

@@ -17,10 +17,6 @@ struct BulkAt {
 };
 static_assert(BulkAt::kCrc + 4 == kBulkHeaderBytes);
 
-/// V4L2's codes, in the order of PixelFormat.
-constexpr std::array<std::string_view, kPixelFormatNames.size()> kBulkFourCc{
-    "GREY", "Y16 ", "YUYV", "RGB3", "RGGB", "GRBG", "GBRG", "BA81", "RG16", "GR16", "GB16", "BYR2"};
-
 }  // namespace
 
 std::array<std::uint8_t, kBulkHeaderBytes> encode_bulk_header(const BulkFrameHeader& h) noexcept {
@@ -30,7 +26,7 @@ std::array<std::uint8_t, kBulkHeaderBytes> encode_bulk_header(const BulkFrameHea
     put_le(&b[BulkAt::kLength], static_cast<std::uint16_t>(kBulkHeaderBytes));
     put_le(&b[BulkAt::kTime], static_cast<std::uint64_t>(h.t_ns));
     put_le(&b[BulkAt::kNumber], h.number);
-    std::ranges::copy(kBulkFourCc[static_cast<std::size_t>(h.pixel)], &b[BulkAt::kFormat]);
+    std::ranges::copy(row_of(h.pixel).v4l2, &b[BulkAt::kFormat]);
     put_le(&b[BulkAt::kWidth], h.width);
     put_le(&b[BulkAt::kHeight], h.height);
     put_le(&b[BulkAt::kRow], static_cast<std::uint32_t>(h.width * bytes_per_pixel(h.pixel)));
@@ -50,12 +46,10 @@ std::optional<BulkFrameHeader> decode_bulk_header(std::span<const std::uint8_t> 
     BulkFrameHeader h;
     h.t_ns = static_cast<std::int64_t>(get_le<std::uint64_t>(&b[BulkAt::kTime]));
     h.number = get_le<std::uint32_t>(&b[BulkAt::kNumber]);
-    const auto code = std::ranges::find_if(kBulkFourCc, [&](std::string_view fourcc) {
-        return std::ranges::equal(fourcc, b.subspan(BulkAt::kFormat, 4), {},
-                                  [](char c) { return static_cast<std::uint8_t>(c); });
-    });
-    if (code == kBulkFourCc.end()) return std::nullopt;
-    h.pixel = static_cast<PixelFormat>(code - kBulkFourCc.begin());
+    const std::string code(&b[BulkAt::kFormat], &b[BulkAt::kFormat] + 4);
+    const std::optional<PixelFormat> pixel = pixel_format_from(code, &PixelFormatRow::v4l2);
+    if (!pixel) return std::nullopt;
+    h.pixel = *pixel;
     h.width = get_le<std::uint32_t>(&b[BulkAt::kWidth]);
     h.height = get_le<std::uint32_t>(&b[BulkAt::kHeight]);
     h.pixels_crc32 = get_le<std::uint32_t>(&b[BulkAt::kPixelsCrc]);

@@ -10,15 +10,6 @@
 namespace narpa {
 namespace {
 
-std::string_view colour_space(PixelFormat pixel) {
-    switch (pixel) {
-        case PixelFormat::grey: return "mono";
-        case PixelFormat::y16: return "mono16";
-        case PixelFormat::yuyv: return "422";
-        default: return {};
-    }
-}
-
 /// The value of a header's tag, such as the 640 of W640; empty without one.
 std::string_view tag_value(std::string_view line, char tag) {
     for (std::size_t at = 0; at < line.size();) {
@@ -46,7 +37,7 @@ void for_each_sample(const VideoFormat& f, const auto& copy) {
 }  // namespace
 
 Result<std::string> y4m_stream_header(const VideoFormat& format) {
-    const std::string_view colour = colour_space(format.pixel);
+    const std::string_view colour = row_of(format.pixel).y4m;
     if (colour.empty())
         return Error{"Y4M cannot hold " + std::string(name(format.pixel)) + " frames; it holds GREY, Y16 and YUYV"};
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
@@ -69,7 +60,7 @@ Status check_y4m_stream_header(std::string_view line, const VideoFormat& format)
     const std::string found =
         size_text(tag_value(tags, 'W'), tag_value(tags, 'H'), colour.empty() ? "420" : colour);
     const std::string expected =
-        size_text(std::to_string(format.width), std::to_string(format.height), colour_space(format.pixel));
+        size_text(std::to_string(format.width), std::to_string(format.height), row_of(format.pixel).y4m);
     if (found != expected) return Error{"the stream has " + found + " frames, expected " + expected};
     return Ok{};
 }

@@ -52,37 +52,41 @@ Pinhole read_pinhole(const YAML::Node& document) {
     return {k[0], k[4], k[2], k[5]};
 }
 
-bool is_fisheye(const YAML::Node& document) {
-    if (const YAML::Node node = document["fisheye_model"]) return node.as<int>(0) != 0;
+const ProjectionKind& kind_of(const YAML::Node& document) {
+    if (const YAML::Node node = document["fisheye_model"])
+        return *opencv_kind(node.as<int>(0) != 0 ? "fisheye" : "opencv");
     const YAML::Node node = document["distortion_model"];
-    if (!node) return false;
-    const auto name = node.as<std::string>("");
-    if (name == "equidistant" || name == "fisheye") return true;
-    if (name == "plumb_bob" || name == "rational_polynomial" || name.empty()) return false;
-    throw YamlFault{
-        fmt::format("distortion_model \"{}\" is not known here, expected plumb_bob, rational_polynomial, "
-                    "equidistant or fisheye",
-                    name),
-        node.Mark()};
+    const auto name = node ? node.as<std::string>("") : "";
+    if (name.empty()) return *opencv_kind("opencv");
+    std::vector<std::string_view> known;
+    for (const ProjectionKind* kind : projection_kinds())
+        for (const RosName& ros : kind->ros) {
+            if (ros.name == name) return *kind;
+            known.push_back(ros.name);
+        }
+    const std::string_view last = known.back();
+    known.pop_back();
+    throw YamlFault{fmt::format("distortion_model \"{}\" is not known here, expected {} or {}", name,
+                                fmt::join(known, ", "), last),
+                    node.Mark()};
 }
 
-std::optional<Distortion> read_distortion(const YAML::Node& document, const Pinhole& pinhole) {
-    Distortion d{.model = is_fisheye(document) ? Distortion::Model::fisheye : Distortion::Model::opencv,
-                 .coefficients = {}};
+std::shared_ptr<const CameraModel> read_model(const YAML::Node& document) {
+    ProjectionParameters p{&kind_of(document), read_pinhole(document)};
     if (const YAML::Node node = document["distortion_coefficients"]; node && !node.IsNull())
-        d.coefficients = matrix(document, "distortion_coefficients", "numbers");
+        p.values = matrix(document, "distortion_coefficients", "numbers");
     constexpr std::size_t kTilted = 14;
-    if (d.coefficients.size() == kTilted && d.coefficients[12] == 0 && d.coefficients[13] == 0)
-        d.coefficients.resize(12);
-    const bool zero = std::ranges::all_of(d.coefficients, [](double c) { return c == 0; });
-    if (zero && d.model == Distortion::Model::opencv) return std::nullopt;
-    if (!distorted(pinhole, d))
-        throw YamlFault{fmt::format("distortion_coefficients: got {}, expected {}", d.coefficients.size(),
-                                    d.model == Distortion::Model::fisheye
-                                        ? "4, as the model is a fisheye"
-                                        : "4, 5, 8 or 12 (a tilted detector is not in this version)"),
+    if (p.values.size() == kTilted && p.values[12] == 0 && p.values[13] == 0) p.values.resize(12);
+    const bool opencv = p.kind->opencv == "opencv";
+    if (opencv && std::ranges::all_of(p.values, [](double c) { return c == 0; }))
+        return std::make_shared<Pinhole>(p.pinhole);
+    std::shared_ptr<const CameraModel> model = make_projection(p);
+    if (!model)
+        throw YamlFault{fmt::format("distortion_coefficients: got {}, expected {}", p.values.size(),
+                                    opencv ? "4, 5, 8 or 12 (a tilted detector is not in this version)"
+                                           : "4, as the model is a fisheye"),
                         document["distortion_coefficients"].Mark()};
-    return d;
+    return model;
 }
 
 }  // namespace
@@ -93,16 +97,21 @@ Result<Calibration> read_calibration(const std::string& file) {
                                       Calibration c;
                                       c.width = pixels(document, "image_width");
                                       c.height = pixels(document, "image_height");
-                                      c.pinhole = read_pinhole(document);
-                                      c.distortion = read_distortion(document, c.pinhole);
+                                      c.model = read_model(document);
                                       return c;
                                   });
 }
 
-std::string calibration_text(const std::string& camera_name, const Calibration& c) {
-    const bool fisheye = c.distortion && c.distortion->model == Distortion::Model::fisheye;
-    const std::vector<double> coefficients = c.distortion ? c.distortion->coefficients : std::vector<double>(5);
-    const char* model = fisheye ? "equidistant" : coefficients.size() > 5 ? "rational_polynomial" : "plumb_bob";
+Result<std::string> calibration_text(const std::string& camera_name, const Calibration& c) {
+    const auto [kind, p, coefficients] = opencv_parameters(*c.model);
+    if (kind == nullptr || kind->ros.empty()) {
+        const ProjectionKind* own = c.model->parameters().kind;
+        return Error{fmt::format("camera \"{}\": files of OpenCV and ROS cannot state its projection, {}",
+                                 camera_name, own == nullptr ? "of a kind of its own" : own->name)};
+    }
+    const bool fisheye = kind->opencv == "fisheye";
+    const auto model = std::ranges::find_if(
+        kind->ros, [n = coefficients.size()](const RosName& name) { return n <= name.parameters_max; });
     const auto list = [](const std::vector<double>& numbers) {
         return fmt::format("[{}]", fmt::join(numbers, ", "));
     };
@@ -110,11 +119,10 @@ std::string calibration_text(const std::string& camera_name, const Calibration& 
         return fmt::format("{}: !!opencv-matrix\n  rows: {}\n  cols: {}\n  dt: d\n  data: {}\n", key, rows,
                            numbers.size() / static_cast<std::size_t>(rows), list(numbers));
     };
-    const Pinhole& p = c.pinhole;
     return fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\ncamera_name: {}\n", c.width, c.height,
                        camera_name) +
            matrix("camera_matrix", 3, {p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1}) +
-           fmt::format("distortion_model: {}\n", model) + (fisheye ? "fisheye_model: 1\n" : "") +
+           fmt::format("distortion_model: {}\n", model->name) + (fisheye ? "fisheye_model: 1\n" : "") +
            matrix("distortion_coefficients", 1, coefficients) +
            matrix("rectification_matrix", 3, {1, 0, 0, 0, 1, 0, 0, 0, 1}) +
            matrix("projection_matrix", 3, {p.fx, 0, p.cx, 0, 0, p.fy, p.cy, 0, 0, 0, 1, 0});

@@ -1,11 +1,11 @@
 /// renderer/assets/calibration_file.h - a camera's calibration in the files of OpenCV and ROS.
 #pragma once
 
-#include <optional>
+#include <memory>
 #include <string>
 
 #include "base/result.h"
-#include "renderer/projection/distortion.h"
+#include "renderer/projection/projection_kind.h"
 
 namespace narpa {
 
@@ -13,8 +13,7 @@ inline constexpr int kMaxPixelsPerSide = 16384;  ///< of a camera's image
 
 struct Calibration {
     int width = 0, height = 0;
-    Pinhole pinhole;
-    std::optional<Distortion> distortion;  ///< none where all coefficients are 0
+    std::shared_ptr<const CameraModel> model;  ///< a pinhole where all of OpenCV's coefficients are 0
 };
 
 /// YAML: `camera_info` of ROS (`distortion_model` is plumb_bob, rational_polynomial, equidistant or fisheye) and
@@ -22,7 +21,7 @@ struct Calibration {
 /// distortion_coefficients; rectification and projection are not. Errors name the file and the line.
 [[nodiscard]] Result<Calibration> read_calibration(const std::string& file);
 
-/// The text of a file that both can read.
-[[nodiscard]] std::string calibration_text(const std::string& camera_name, const Calibration& calibration);
+/// The text of a file that both can read; an error if they have no name for the camera's projection.
+[[nodiscard]] Result<std::string> calibration_text(const std::string& camera_name, const Calibration& calibration);
 
 }  // namespace narpa

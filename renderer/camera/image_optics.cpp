@@ -22,12 +22,11 @@ double relative_illumination(const Vignetting& v, double theta) {
 }
 
 std::vector<float> gain_of(const Camera& camera) {
-    const CameraModelHandle model(camera);
     std::vector<float> gain;
     gain.reserve(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
     for (int y = 0; y < camera.height; ++y)
         for (int x = 0; x < camera.width; ++x) {
-            const Vec3 d = model->direction({static_cast<double>(x), static_cast<double>(y)});
+            const Vec3 d = camera.model->direction({static_cast<double>(x), static_cast<double>(y)});
             gain.push_back(static_cast<float>(
                 relative_illumination(*camera.vignetting, std::atan2(std::hypot(d.x, d.y), d.z))));
         }

@@ -37,7 +37,10 @@ double blackbody(const SolarBand& band, double temperature_k) noexcept {
 
 /// Diameter of a star's image where the lens is not focused at infinity.
 double disc_px(const Camera& camera) noexcept {
-    return camera.lens ? std::min(circle_of_confusion_px(*camera.lens, camera.fx, kInfinity), kWidestDisc_px) : 0;
+    return camera.lens
+               ? std::min(circle_of_confusion_px(*camera.lens, camera.model->pixels_per_radian(), kInfinity),
+                          kWidestDisc_px)
+               : 0;
 }
 
 /// Points per pixel along a trail such that the trail is even: the transfer at the points' spatial frequency is
@@ -84,7 +87,7 @@ Vec3 aberrated(const Vec3& direction, const Vec3& velocity_m_s) noexcept {
 StarLight::StarLight(const Scene& scene, const Camera& camera)
     : camera_(camera),
       field_(*scene.stars),
-      model_(camera),
+      model_(camera.model),
       response_(camera.point_spread.value_or(PointSpreadFunction{}), disc_px(camera)),
       points_per_px_(points_per_px(camera.point_spread.value_or(PointSpreadFunction{}))),
       moments_(kMaxSegments + 1),

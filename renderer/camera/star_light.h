@@ -72,7 +72,7 @@ private:
 
     const Camera& camera_;
     const StarField& field_;
-    CameraModelHandle model_;
+    std::shared_ptr<const CameraModel> model_;
     PointResponse response_;
     double points_per_px_;         ///< along a trail
     DirectionCone view_;           ///< cone of the image extended by the response's reach, camera axes

@@ -20,8 +20,8 @@ std::unique_ptr<const SunGhost> SunGhost::create(const Scene& scene, const Camer
 SunGhost::SunGhost(const Sun& sun, const Ghost& ghost, const Camera& camera)
     : sun_(sun),
       ghost_(ghost),
-      model_(camera),
-      principal_(model_->project({0, 0, 1}).value_or(ImagePoint{camera.cx, camera.cy})) {}
+      model_(camera.model),
+      principal_(model_->project({0, 0, 1}).value_or(ImagePoint{})) {}
 
 std::optional<ImagePoint> SunGhost::centre(const Rigid3& T_world_camera) const noexcept {
     const Vec3 direction = conjugate(T_world_camera.q) * sun_.direction;

@@ -40,7 +40,7 @@ private:
 
     Sun sun_;
     Ghost ghost_;
-    CameraModelHandle model_;
+    std::shared_ptr<const CameraModel> model_;
     ImagePoint principal_;
 };
 

@@ -77,13 +77,13 @@ void store_first_hits(const Frame& f, int width, int height, Aovs& aovs) {
 /// Pixels beyond the image circle of a camera that has one, row by row.
 std::vector<std::uint32_t> unseen_pixels(const Camera& camera) {
     std::vector<std::uint32_t> unseen;
-    const CameraModelHandle model(camera);
+    const CameraModel& model = *camera.model;
     const double right = camera.width - 1, bottom = camera.height - 1;
     const std::array<ImagePoint, 4> corners{{{0, 0}, {right, 0}, {0, bottom}, {right, bottom}}};
-    if (std::ranges::all_of(corners, [&](const ImagePoint& p) { return model->sees(p); })) return unseen;
+    if (std::ranges::all_of(corners, [&](const ImagePoint& p) { return model.sees(p); })) return unseen;
     for (int y = 0; y < camera.height; ++y)
         for (int x = 0; x < camera.width; ++x)
-            if (!model->sees({static_cast<double>(x), static_cast<double>(y)}))
+            if (!model.sees({static_cast<double>(x), static_cast<double>(y)}))
                 unseen.push_back(static_cast<std::uint32_t>(y * camera.width + x));
     return unseen;
 }

@@ -18,7 +18,7 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const Lens* const lens = blurred ? &*camera.lens : nullptr;
     const Mechanisms& on = settings.mechanisms;
     const bool over_time = pose.over_time() && (pose.moves() || at.moving());
-    const CameraModelHandle model(camera);
+    const CameraModel* const model = camera.model.get();
     const Integrator& integrator = integrator_kind(settings.method).choose(render_scene, on.separate_sun);
     const LightParts parts = integrator.parts();
     const PathSettings path{

@@ -21,7 +21,7 @@ struct Frame {
     Rigid3 T_world_camera;  ///< at mid-exposure
     bool over_time;         ///< each ray has its own time; else all are at mid-exposure
     const FrameSettings& settings;
-    CameraModelHandle model;
+    const CameraModel* model;  ///< of the camera, never null
     const Lens* lens;  ///< null: pinhole, all in focus
     const std::optional<SunDisc>& sun;
     const Integrator& integrator;

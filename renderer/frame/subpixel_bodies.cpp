@@ -36,7 +36,7 @@ double spread_reach_m(const CameraModel& model, const Vec3& centre, double radiu
 }
 
 SubpixelBodies::SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera,
-                               const CameraModelHandle& model, const Rigid3& T_world_camera, const Lens* lens,
+                               const CameraModel* model, const Rigid3& T_world_camera, const Lens* lens,
                                bool moving)
     : tracer_(tracer),
       at_(at),

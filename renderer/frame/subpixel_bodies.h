@@ -38,7 +38,7 @@ class SubpixelBodies {
 public:
     /// `lens`: null if all is in focus. Finds none if the camera or bodies move within the exposure, and never a
     /// body with an atmosphere: the camera's regular rays then sample them. Tracer and poses outlive this.
-    SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const CameraModelHandle& model,
+    SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const Camera& camera, const CameraModel* model,
                    const Rigid3& T_world_camera, const Lens* lens, bool moving);
 
     /// True if there is any in the image.
@@ -62,7 +62,7 @@ private:
 
     const Tracer& tracer_;
     const BodyPoses& at_;
-    CameraModelHandle model_;
+    const CameraModel* model_;
     Rigid3 T_world_camera_;
     const Lens* lens_;
     double sample_reach_px_;

@@ -21,7 +21,7 @@ TileCulling::TileCulling(const Tracer& tracer, const Camera& camera)
 
 void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept {
     std::fill(listed_.begin(), listed_.end(), std::uint8_t{0});
-    const CameraModelHandle model(camera_);
+    const CameraModel& model = *camera_.model;
     for (const std::uint32_t body : tracer_.all_bodies()) {
         CulledBody culled{tracer_.bounds(body), boxes_[body], BodyView(at.T_world_body[body], T_world_camera),
                           kEmbreeSlack * tracer_.bounding_radius_m(body)};
@@ -29,13 +29,13 @@ void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, cons
         if (camera_.point_spread) {
             const auto& [c, r] = culled.bounds;
             const auto& [x, y, z] = culled.view.axes;
-            culled.slack_m += spread_reach_m(*model, culled.view.centre_camera + c.x * x + c.y * y + c.z * z,
+            culled.slack_m += spread_reach_m(model, culled.view.centre_camera + c.x * x + c.y * y + c.z * z,
                                              std::max({r.x, r.y, r.z}));
         }
-        if (const Pinhole* pinhole = model->pinhole())
+        if (const Pinhole* pinhole = model.pinhole())
             mark_by_projection(*pinhole, camera_, lens, culled, mask_);
         else
-            mark_by_cones(*model, lens, culled, mask_);
+            mark_by_cones(model, lens, culled, mask_);
         list(body);
     }
 }

@@ -67,20 +67,6 @@ Error Problems::first() const {
     return std::min_element(problems_.begin(), problems_.end(), earlier)->error;
 }
 
-bool Range::holds(double x) const {
-    if (infinite && x == std::numeric_limits<double>::infinity()) return true;
-    return std::isfinite(x) && (low_open ? x > low : x >= low) && (high_open ? x < high : x <= high);
-}
-
-std::string Range::words() const {
-    const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
-    if (has_low && has_high)
-        return fmt::format("a number in {}{}, {}{}", low_open ? '(' : '[', low, high, high_open ? ')' : ']');
-    if (has_low) return fmt::format("a number {} {}{}", low_open ? ">" : ">=", low, infinite ? ", or inf" : "");
-    if (has_high) return fmt::format("a number {} {}", high_open ? "<" : "<=", high);
-    return "a finite number";
-}
-
 const toml::node* TableReader::find(std::string_view key) {
     if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) asked_.emplace_back(key);
     return table_->get(key);

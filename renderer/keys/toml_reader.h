@@ -19,6 +19,7 @@
 
 #include "base/pose.h"
 #include "base/result.h"
+#include "renderer/keys/keys.h"
 
 namespace narpa {
 
@@ -47,20 +48,6 @@ private:
     std::string file_;
     std::vector<Problem> problems_;
 };
-
-/// The interval that a number has to lie in.
-struct Range {
-    double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
-    bool low_open = false, high_open = false;
-    bool infinite = false;  ///< inf is allowed, too
-
-    [[nodiscard]] bool holds(double x) const;
-    [[nodiscard]] std::string words() const;  ///< "a number > 0"
-};
-inline constexpr Range kAnyNumber{};
-inline constexpr Range kPositive{.low = 0, .low_open = true};
-inline constexpr Range kNotNegative{.low = 0};
-inline constexpr Range kUnit{.low = 0, .high = 1};
 
 /// A finite vector times a power of two that brings its largest component into [1, 2), so that no square overflows
 /// or vanishes, and no rounding changes. Zero stays zero.

@@ -25,7 +25,6 @@ SurfaceMapper::SurfaceMapper(const Tracer& tracer, const BodyPoses& at, const Ca
     : tracer_(tracer),
       at_(at),
       camera_(camera),
-      model_(camera),
       T_world_camera_(T_world_camera),
       T_frame_world_(quantity.body < 0 ? Rigid3{}
                                        : inverse(at.T_world_body[static_cast<std::size_t>(quantity.body)])),
@@ -33,8 +32,8 @@ SurfaceMapper::SurfaceMapper(const Tracer& tracer, const BodyPoses& at, const Ca
 
 Hit SurfaceMapper::hit_at(const ImagePoint& p) const {
     Hit hit;
-    if (model_->sees(p))
-        hit = tracer_.intersect(at_, camera_ray(model_, T_world_camera_, p.x, p.y),
+    if (camera_.model->sees(p))
+        hit = tracer_.intersect(at_, camera_ray(camera_, T_world_camera_, p.x, p.y),
                                 std::numeric_limits<double>::infinity());
     if (quantity_.body >= 0 && hit.body != quantity_.body) hit.body = -1;
     return hit;
@@ -73,7 +72,7 @@ SurfaceMap SurfaceMapper::map() const {
                 static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
             out.position_m[i] = T_frame_world_ * hit.position;
             out.quantity.values[i] =
-                quantity_of(quantity_, out.position_m[i], hit, hit.range_m * model_->direction(p));
+                quantity_of(quantity_, out.position_m[i], hit, hit.range_m * camera_.model->direction(p));
             out.shade[i] = static_cast<float>(std::max(0.0, dot(R_camera_world * hit.shading_normal, kToLight)));
         }
     });
@@ -86,7 +85,7 @@ bool SurfaceMapper::is_continuous(const ImagePoint& a, const ImagePoint& b) cons
     ImagePoint from = a, to = b;
     Hit hit_from = hit_at(from), hit_to = hit_at(to);
     if (hit_from.body < 0 || hit_to.body < 0) return false;
-    const double pixel_m = std::min(hit_from.range_m, hit_to.range_m) / model_->pixels_per_radian();
+    const double pixel_m = std::min(hit_from.range_m, hit_to.range_m) / camera_.model->pixels_per_radian();
     const double whole = std::abs(hit_to.range_m - hit_from.range_m);
     double difference = whole;
     for (int k = 0; k < kHalvings; ++k) {

@@ -61,7 +61,6 @@ private:
     const Tracer& tracer_;
     const BodyPoses& at_;
     const Camera& camera_;
-    CameraModelHandle model_;
     Rigid3 T_world_camera_, T_frame_world_;
     MapQuantity quantity_;
 };

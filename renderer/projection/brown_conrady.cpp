@@ -1,5 +1,6 @@
 #include "renderer/projection/brown_conrady.h"
 
+#include <array>
 #include <cmath>
 
 #include "base/each_isa.h"
@@ -94,9 +95,22 @@ NARPA_EACH_ISA void directions_of(const Model& m, const Pinhole& pinhole, const 
 
 }  // namespace
 
-BrownConrady::BrownConrady(const Pinhole& pinhole, const Coefficients& coefficients)
-    : pinhole_(pinhole),
-      c_(coefficients),
+namespace {
+
+constexpr std::array<Key, 1> kKeys{{{"coefficients", rows::numbers({4, 5, 8, 12}), kCoefficients}}};
+constexpr std::array<RosName, 2> kRosNames{{{"plumb_bob", 5}, {"rational_polynomial", 12}}};
+
+}  // namespace
+
+constinit const ProjectionKind kBrownConrady{
+    .name = "brown_conrady", .opencv = "opencv", .ros = kRosNames, .keys = kKeys, .make = make_model<BrownConrady>};
+
+BrownConrady::BrownConrady(const Pinhole& pinhole, std::span<const double> coefficients)
+    : CalibratedModel(kBrownConrady, pinhole, coefficients),
+      c_([&] {
+          const auto at = [&](std::size_t i) { return i < coefficients.size() ? coefficients[i] : 0; };
+          return Coefficients{at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), at(10), at(11)};
+      }()),
       inverse_(
           kMaxPlane, [&](double r) { return radius(r); }, [&](double r) { return slope(r); }) {}
 
@@ -150,21 +164,8 @@ bool BrownConrady::sees(const ImagePoint& p) const noexcept {
     return is_solution(*this, inverse_, {wanted.x, wanted.y}, {u, v});
 }
 
-DirectionCone BrownConrady::bounds(const ImageRect& rect) const noexcept {
-    return cone_about_border(*this, rect);
-}
-
-std::shared_ptr<const CameraModel> BrownConrady::scaled(double x, double y) const {
-    return std::make_shared<BrownConrady>(pinhole_.with_scale(x, y), c_);
-}
-std::shared_ptr<const CameraModel> BrownConrady::windowed(double x, double y) const {
-    return std::make_shared<BrownConrady>(pinhole_.with_origin(x, y), c_);
-}
-
 bool BrownConrady::is_valid() const noexcept {
-    for (const double c : {c_.k1, c_.k2, c_.k3, c_.k4, c_.k5, c_.k6, c_.p1, c_.p2, c_.s1, c_.s2, c_.s3, c_.s4})
-        if (!std::isfinite(c)) return false;
-    return pinhole_.is_valid() && inverse_.most() > 0;
+    return CalibratedModel::is_valid() && inverse_.most() > 0;
 }
 
 }  // namespace narpa

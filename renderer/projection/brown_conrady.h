@@ -12,18 +12,16 @@
 /// 14 (1992), thin prism; OpenCV's documentation for the order and the rational form.
 #pragma once
 
-#include "renderer/projection/pinhole.h"
+#include "renderer/projection/calibrated_model.h"
 #include "renderer/projection/radial_inverse.h"
 
 namespace narpa {
 
 /// The image ends where r L no longer grows with r, because it would fold over beyond.
-class BrownConrady final : public CameraModel {
+class BrownConrady final : public CalibratedModel {
 public:
-    struct Coefficients {
-        double k1 = 0, k2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0, p1 = 0, p2 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0;
-    };
-    BrownConrady(const Pinhole& pinhole, const Coefficients& coefficients);
+    /// k1, k2, p1, p2 [, k3 [, k4, k5, k6 [, s1, s2, s3, s4]]]: 4, 5, 8 or 12 coefficients.
+    BrownConrady(const Pinhole& pinhole, std::span<const double> coefficients);
 
     /// By Newton's method: exact to rounding where `sees` is true, the direction of the rim beyond.
     [[nodiscard]] Vec3 direction(const ImagePoint& p) const noexcept override { return normalized(on_plane(p)); }
@@ -33,10 +31,6 @@ public:
     [[nodiscard]] std::optional<ImagePoint> project(const Vec3& point) const noexcept override;
     [[nodiscard]] ProjectionJacobian jacobian(const Vec3& point) const noexcept override;
     [[nodiscard]] bool sees(const ImagePoint& p) const noexcept override;
-    [[nodiscard]] double pixels_per_radian() const noexcept override { return pinhole_.fx; }
-    [[nodiscard]] DirectionCone bounds(const ImageRect& rect) const noexcept override;
-    [[nodiscard]] std::shared_ptr<const CameraModel> scaled(double x, double y) const override;
-    [[nodiscard]] std::shared_ptr<const CameraModel> windowed(double x, double y) const override;
     [[nodiscard]] bool is_valid() const noexcept override;
 
     /// The distorted image of a point of the plane z = 1, and its derivatives: u_by_v is du'/dv.
@@ -49,9 +43,12 @@ private:
     [[nodiscard]] double radius(double r) const noexcept;
     [[nodiscard]] double slope(double r) const noexcept;
 
-    Pinhole pinhole_;
-    Coefficients c_;
+    struct Coefficients {
+        double k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4;
+    } c_;
     RadialInverse inverse_;
 };
+
+extern const ProjectionKind kBrownConrady;
 
 }  // namespace narpa

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "renderer/projection/projection_kind.h"
 
 namespace narpa {
 
@@ -18,6 +21,11 @@ void CameraModel::directions(const Quat& q, const Lanes<double>& x, const Lanes<
 double CameraModel::pixels_per_sr(const Vec3& d) const noexcept {
     const auto [x, y] = jacobian(d);
     return norm(cross(x, y));
+}
+
+ProjectionParameters CameraModel::parameters() const {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+    return {.kind = nullptr, .pinhole = {kNaN, kNaN, kNaN, kNaN}};
 }
 
 /// From sixteen points of the border. Between two of them the border deviates from the nearer one by half their

@@ -6,7 +6,8 @@
 /// side.
 ///
 /// A new kind of camera is a class of its own, set as Camera::model: renderer, tile culling and estimator use only
-/// this interface. Algorithms that need straight lines to stay straight use `pinhole()`.
+/// this interface. Algorithms that need straight lines to stay straight use `pinhole()`. Kinds that scene files
+/// name are in projection_kind.h.
 #pragma once
 
 #include <memory>
@@ -40,6 +41,8 @@ struct ProjectionJacobian {
 [[nodiscard]] double largest_stretch(const ProjectionJacobian& J) noexcept;
 
 class Pinhole;
+struct ProjectionKind;
+struct ProjectionParameters;
 
 /// A central projection: all rays pass the origin of the camera's axes. Immutable.
 class CameraModel {
@@ -81,6 +84,8 @@ public:
 
     /// True if the parameters are finite and define a projection.
     [[nodiscard]] virtual bool is_valid() const noexcept { return true; }
+    /// What files state of it: projection_kind.h. By default of no kind that files name.
+    [[nodiscard]] virtual ProjectionParameters parameters() const;
     /// Itself if it is a pinhole, else null.
     [[nodiscard]] virtual const Pinhole* pinhole() const noexcept { return nullptr; }
 };

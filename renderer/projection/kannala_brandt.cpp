@@ -1,6 +1,7 @@
 #include "renderer/projection/kannala_brandt.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -76,9 +77,23 @@ NARPA_EACH_ISA void directions_of(const KannalaBrandt& m, const Pinhole& pinhole
 
 }  // namespace
 
-KannalaBrandt::KannalaBrandt(const Pinhole& pinhole, const Coefficients& coefficients)
-    : pinhole_(pinhole),
-      c_(coefficients),
+namespace {
+
+constexpr std::array<Key, 1> kKeys{{{"coefficients", rows::numbers({4}), kCoefficients}}};
+constexpr std::array<RosName, 2> kRosNames{{{"equidistant", 4}, {"fisheye", 4}}};
+
+}  // namespace
+
+constinit const ProjectionKind kKannalaBrandt{.name = "kannala_brandt",
+                                              .opencv = "fisheye",
+                                              .ros = kRosNames,
+                                              .keys = kKeys,
+                                              .fov_max_deg = 360,
+                                              .make = make_model<KannalaBrandt>};
+
+KannalaBrandt::KannalaBrandt(const Pinhole& pinhole, std::span<const double> k)
+    : CalibratedModel(kKannalaBrandt, pinhole, k),
+      c_{k[0], k[1], k[2], k[3]},
       inverse_(
           kMaxAngle_rad, [&](double t) { return radius(t); }, [&](double t) { return slope(t); }) {}
 
@@ -113,21 +128,8 @@ bool KannalaBrandt::sees(const ImagePoint& p) const noexcept {
     return std::hypot(wanted.x, wanted.y) <= inverse_.max_distorted();
 }
 
-DirectionCone KannalaBrandt::bounds(const ImageRect& rect) const noexcept {
-    return cone_about_border(*this, rect);
-}
-
-std::shared_ptr<const CameraModel> KannalaBrandt::scaled(double x, double y) const {
-    return std::make_shared<KannalaBrandt>(pinhole_.with_scale(x, y), c_);
-}
-std::shared_ptr<const CameraModel> KannalaBrandt::windowed(double x, double y) const {
-    return std::make_shared<KannalaBrandt>(pinhole_.with_origin(x, y), c_);
-}
-
 bool KannalaBrandt::is_valid() const noexcept {
-    for (const double c : {c_.k1, c_.k2, c_.k3, c_.k4})
-        if (!std::isfinite(c)) return false;
-    return pinhole_.is_valid() && inverse_.most() > 0;
+    return CalibratedModel::is_valid() && inverse_.most() > 0;
 }
 
 }  // namespace narpa

@@ -10,18 +10,16 @@
 /// IEEE PAMI 28 (2006).
 #pragma once
 
-#include "renderer/projection/pinhole.h"
+#include "renderer/projection/calibrated_model.h"
 #include "renderer/projection/radial_inverse.h"
 
 namespace narpa {
 
 /// The image ends where theta' no longer grows with theta, and at 180 degrees.
-class KannalaBrandt final : public CameraModel {
+class KannalaBrandt final : public CalibratedModel {
 public:
-    struct Coefficients {
-        double k1 = 0, k2 = 0, k3 = 0, k4 = 0;
-    };
-    KannalaBrandt(const Pinhole& pinhole, const Coefficients& coefficients);
+    /// k1, k2, k3, k4.
+    KannalaBrandt(const Pinhole& pinhole, std::span<const double> coefficients);
 
     /// By Newton's method: exact to rounding where `sees` is true, the direction of the rim beyond.
     [[nodiscard]] Vec3 direction(const ImagePoint& p) const noexcept override;
@@ -30,10 +28,6 @@ public:
     [[nodiscard]] std::optional<ImagePoint> project(const Vec3& point) const noexcept override;
     [[nodiscard]] ProjectionJacobian jacobian(const Vec3& point) const noexcept override;
     [[nodiscard]] bool sees(const ImagePoint& p) const noexcept override;
-    [[nodiscard]] double pixels_per_radian() const noexcept override { return pinhole_.fx; }
-    [[nodiscard]] DirectionCone bounds(const ImageRect& rect) const noexcept override;
-    [[nodiscard]] std::shared_ptr<const CameraModel> scaled(double x, double y) const override;
-    [[nodiscard]] std::shared_ptr<const CameraModel> windowed(double x, double y) const override;
     [[nodiscard]] bool is_valid() const noexcept override;
 
     /// theta' and its derivative.
@@ -41,9 +35,12 @@ public:
     [[nodiscard]] double slope(double theta) const noexcept;
 
 private:
-    Pinhole pinhole_;
-    Coefficients c_;
+    struct Coefficients {
+        double k1, k2, k3, k4;
+    } c_;
     RadialInverse inverse_;
 };
+
+extern const ProjectionKind kKannalaBrandt;
 
 }  // namespace narpa

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/each_isa.h"
+#include "renderer/projection/projection_kind.h"
 
 namespace narpa {
 namespace {
@@ -44,5 +45,20 @@ std::shared_ptr<const CameraModel> Pinhole::scaled(double x, double y) const {
 std::shared_ptr<const CameraModel> Pinhole::windowed(double x, double y) const {
     return std::make_shared<Pinhole>(with_origin(x, y));
 }
+
+ProjectionParameters Pinhole::parameters() const {
+    return {.kind = &kPinhole, .pinhole = *this};
+}
+
+Pinhole paraxial_pinhole(const CameraModel& model) {
+    const Pinhole p = model.parameters().pinhole;
+    const double to_axis = model.pixels_per_radian() / p.fx;
+    return {p.fx * to_axis, p.fy * to_axis, p.cx, p.cy};
+}
+
+constinit const ProjectionKind kPinhole{
+    .name = "pinhole", .make = [](const Pinhole& pinhole, std::span<const double>) {
+        return std::shared_ptr<const CameraModel>(std::make_shared<Pinhole>(pinhole));
+    }};
 
 }  // namespace narpa

@@ -54,7 +54,13 @@ public:
     [[nodiscard]] bool is_valid() const noexcept override {
         return fx > 0 && fy > 0 && std::isfinite(fx) && std::isfinite(fy) && std::isfinite(cx) && std::isfinite(cy);
     }
+    [[nodiscard]] ProjectionParameters parameters() const override;
     [[nodiscard]] const Pinhole* pinhole() const noexcept override { return this; }
 };
+
+/// The pinhole that agrees with a camera near its axis.
+[[nodiscard]] Pinhole paraxial_pinhole(const CameraModel& model);
+
+extern const ProjectionKind kPinhole;
 
 }  // namespace narpa

@@ -97,9 +97,10 @@ std::vector<Vec3> places_of_sensors(const Scene& scene, std::size_t body) {
 
 /// Pixels per radian in the corner of the image, where a pinhole has most.
 double pixels_per_rad(const Camera& c) {
-    const double f = std::max(c.fx, c.fy), x = std::max(c.cx, c.width - 1 - c.cx) / c.fx,
-                 y = std::max(c.cy, c.height - 1 - c.cy) / c.fy;
-    return c.model ? f : f * (1 + x * x + y * y);
+    const Pinhole p = paraxial_pinhole(*c.model);
+    const double f = std::max(p.fx, p.fy), x = std::max(p.cx, c.width - 1 - p.cx) / p.fx,
+                 y = std::max(p.cy, c.height - 1 - p.cy) / p.fy;
+    return c.model->pinhole() == nullptr ? f : f * (1 + x * x + y * y);
 }
 
 bool is_moving(int mount, const Scene& scene) {

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/projection/pinhole.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -173,9 +172,7 @@ void refuse_tables_of_camera(TableReader& root) {
 /// Refuses thin lenses with a wide field: rays at right angles to the axis do not meet the plane of focus.
 void refuse_wide_field(TableReader& table, const Camera& camera) {
     constexpr double kWidest_deg = 80;
-    const Pinhole pinhole(camera.fx, camera.fy, camera.cx, camera.cy);
-    const CameraModel& model = camera.model ? *camera.model : pinhole;
-    const DirectionCone field = model.bounds({-0.5, -0.5, camera.width - 0.5, camera.height - 0.5});
+    const DirectionCone field = camera.model->bounds({-0.5, -0.5, camera.width - 0.5, camera.height - 0.5});
     const double off_axis_deg = (std::acos(std::clamp(field.axis.z, -1.0, 1.0)) + field.half_angle_rad) * 180 / kPi;
     if (off_axis_deg > kWidest_deg)
         table.fail("lens", fmt::format("the image reaches {:.0f} degrees off the axis, expected at most {:g} for a "

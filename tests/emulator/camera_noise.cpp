@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "emulator/camera/camera_unit.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -14,7 +15,7 @@ Scene stereo_pair() {
     Scene scene;
     Camera camera;
     camera.width = 96, camera.height = 64;
-    camera.fx = camera.fy = 100, camera.cx = 47.5, camera.cy = 31.5;
+    test::set_pinhole(camera, 100, 100, 47.5, 31.5);
     camera.format = PixelFormat::y16;
     Detector d;
     d.shot_noise = true, d.read_noise_e = 50, d.black_level_dn = 200, d.exposure_s = 1e-3;

@@ -9,9 +9,9 @@
 #include "emulator/camera/camera_unit.h"
 #include "emulator/trajectory.h"
 #include "renderer/camera/scene_camera.h"
-#include "renderer/projection/distortion.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
+#include "tests/support/cameras.h"
 #include "tests/support/command.h"
 #include "tests/support/paths.h"
 #include "tracking/estimate_report.h"
@@ -102,7 +102,7 @@ TEST_F(EstimateTest, KnowsTheShutterAndTheLens) {
     Scene s = docking();
     Camera& c = s.cameras[0];
     c.shutter = Shutter{200'000};  // 48 ms from the first row to the last
-    c.model = distorted(pinhole_of(c), {Distortion::Model::opencv, {-0.3, 0.1, 1e-3, -8e-4}});
+    c.model = test::brown_conrady(test::pinhole_of(c), {-0.3, 0.1, 1e-3, -8e-4});
     c.point_spread = PointSpreadFunction{.sigma_px = 0.7};
     Motion& chaser = s.bodies[1].initial;
     chaser.T_world_body.t = {14, 0.4, -0.3};

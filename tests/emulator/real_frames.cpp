@@ -14,6 +14,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/view/frame_comparison.h"
+#include "tests/support/cameras.h"
 #include "tests/support/image_files.h"
 #include "tests/support/paths.h"
 
@@ -66,7 +67,7 @@ protected:
         scene.bodies.push_back(body);
         Camera camera;
         camera.width = j["width"], camera.height = j["height"];
-        camera.fx = j["fx_px"], camera.fy = j["fy_px"], camera.cx = j["cx_px"], camera.cy = j["cy_px"];
+        test::set_pinhole(camera, j["fx_px"], j["fy_px"], j["cx_px"], j["cy_px"]);
         camera.format = PixelFormat::y16;
         camera.detector =
             Detector{.exposure_s = 1e-4, .full_well_e = 40000, .read_noise_e = 30, .shot_noise = true, .bits = 12};

@@ -9,6 +9,7 @@
 #include "renderer/frame/camera_image.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene_file/scene_file.h"
+#include "tests/support/cameras.h"
 #include "tests/support/paths.h"
 
 namespace narpa {
@@ -46,8 +47,9 @@ struct View {
     double sunlit_high = 0, shadow_low = 0;  ///< 95th and 5th percentile of the station's radiance
 };
 View look(const RenderScene& render_scene, const BodyPoses& at, Camera camera) {
-    camera.width /= 4, camera.height /= 4, camera.fx /= 4, camera.fy /= 4;
-    camera.cx = 0.5 * (camera.width - 1), camera.cy = 0.5 * (camera.height - 1);
+    const Pinhole p = test::pinhole_of(camera);
+    camera.width /= 4, camera.height /= 4;
+    test::set_pinhole(camera, p.fx / 4, p.fy / 4, 0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
     RadianceImage image(camera.width, camera.height);
     Aovs aovs;
     const Rigid3 T_world_camera = at.T_world_body[static_cast<std::size_t>(camera.mount)] * camera.T_mount_camera;

@@ -11,8 +11,8 @@
 #include "estimator/stereo/stereo_matcher.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
-#include "renderer/projection/distortion.h"
 #include "tests/estimator/pnp/pnp_ceres.h"
+#include "tests/support/cameras.h"
 #include "tests/support/equidistant_camera.h"
 #include "tests/support/shapes.h"
 
@@ -37,7 +37,7 @@ protected:
             pixels.push_back({image->x + sigma_px * normal(random), image->y + sigma_px * normal(random)});
         }
     }
-    [[nodiscard]] PnpInput input(double sigma_px) const { return {model, body_m, pixels, sigma_px}; }
+    [[nodiscard]] PnpInput input(double sigma_px) const { return {model.get(), body_m, pixels, sigma_px}; }
 
     std::mt19937_64 random{7};
     const std::shared_ptr<const CameraModel> model = std::make_shared<EquidistantCamera>(500, 480, 640, 500);
@@ -99,12 +99,10 @@ TEST_F(EquidistantPoints, PixelsWhoseRaysPointBackwardsAreRejected) {
 /// same image is wrong, and the residuals show it.
 TEST(DistortedPoints, PnpErrorsMatchTheBoundAndIgnoringTheLensDoesNot) {
     const Pinhole pinhole{500, 500, 320, 240};
-    const Distortion barrel{Distortion::Model::opencv, {-0.25, 0.06, 1e-3, -5e-4}},
-        wide{Distortion::Model::fisheye, {-0.02, 0.005, -0.003, 4e-4}};
     constexpr int kTrials = 200;
     constexpr double kSigma_px = 0.3;
-    for (const Distortion& distortion : {barrel, wide}) {
-        const auto model = distorted(pinhole, distortion);
+    for (const auto& model : {test::brown_conrady(pinhole, {-0.25, 0.06, 1e-3, -5e-4}),
+                              test::kannala_brandt(pinhole, {-0.02, 0.005, -0.003, 4e-4})}) {
         PnpSolver solver(64);
         std::mt19937_64 random(11);
         std::uniform_real_distribution<double> u(-1, 1);
@@ -121,7 +119,7 @@ TEST(DistortedPoints, PnpErrorsMatchTheBoundAndIgnoringTheLensDoesNot) {
                 body_m.push_back(p);
                 pixels.push_back({image->x + kSigma_px * normal(random), image->y + kSigma_px * normal(random)});
             }
-            const PnpInput input{model, body_m, pixels, kSigma_px};
+            const PnpInput input{model.get(), body_m, pixels, kSigma_px};
             const PnpSolution& s = solver.solve(input);
             ASSERT_TRUE(s.ok()) << to_text(s.status);
             const auto bound = pnp_bound(input, truth);
@@ -129,7 +127,7 @@ TEST(DistortedPoints, PnpErrorsMatchTheBoundAndIgnoringTheLensDoesNot) {
             const Vector6 error = error_between(s.fit.T_camera_body, truth);
             nees += normalised_error_squared(error, s.fit.covariance) / kTrials;
             over_bound += normalised_error_squared(error, *bound) / kTrials;
-            const PnpSolution& without = solver.solve({pinhole, body_m, pixels, kSigma_px});
+            const PnpSolution& without = solver.solve({&pinhole, body_m, pixels, kSigma_px});
             if (!without.ok()) continue;
             ignored += normalised_error_squared(error_between(without.fit.T_camera_body, truth), *bound) / kTrials;
         }

@@ -58,7 +58,6 @@ private:
 
 /// A camera of this kind with its axis through the middle of the image.
 inline Camera with_equidistant(Camera c, double pixels_per_radian, double max_rad = 3.1) {
-    c.fx = c.fy = c.cx = c.cy = std::nan("");  // nothing may use them
     c.model = std::make_shared<EquidistantCamera>(pixels_per_radian, pixels_per_radian, (c.width - 1) / 2.0,
                                                   (c.height - 1) / 2.0, max_rad);
     return c;

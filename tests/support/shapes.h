@@ -13,6 +13,7 @@
 #include "base/constants.h"
 #include "renderer/geometry/tracer.h"
 #include "renderer/scene/scene.h"
+#include "tests/support/cameras.h"
 
 namespace narpa::test {
 
@@ -136,9 +137,7 @@ inline Camera camera(int width, int height, double focal_px) {
     c.name = "camera";
     c.width = width;
     c.height = height;
-    c.fx = c.fy = focal_px;
-    c.cx = (width - 1) / 2.0;
-    c.cy = (height - 1) / 2.0;
+    set_pinhole(c, focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0);
     c.white_radiance = 1361 / 3.14159265358979323846;
     return c;
 }

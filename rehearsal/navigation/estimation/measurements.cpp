@@ -22,7 +22,7 @@ constexpr double kDenseReach_px = 1;
 /// Factor (sensor pixels per pixel, each way) of the coarsest level that dense alignment needs from a prediction.
 int coarsest_level(const Prediction& predicted, const Camera& camera, double range_m, double reach_m, int most) {
     const double off_m = kSearchSigmas * (predicted.position_sigma_m + predicted.rotation_sigma_rad * reach_m);
-    const double off_px = CameraModelHandle(camera)->pixels_per_radian() * off_m / range_m;
+    const double off_px = camera.model->pixels_per_radian() * off_m / range_m;
     int factor = 1;
     while (factor < most && off_px > kDenseReach_px * factor) factor *= 2;
     return factor;

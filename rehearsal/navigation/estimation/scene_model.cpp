@@ -19,7 +19,8 @@ void apply_model_error(const ModelUncertainty& e, std::size_t target, Scene& sce
     if (scene.sun) scene.sun->direction = exp_rotation(e.light_rad * along) * scene.sun->direction;
     const Quat turn = exp_rotation(e.boresight_rad * along);
     for (Camera& c : scene.cameras) {
-        c.fx *= 1 + e.focal, c.fy *= 1 + e.focal;  // pinholes only; a calibrated lens is unchanged
+        if (const Pinhole* p = c.model->pinhole())  // a calibrated lens is unchanged
+            c.model = std::make_shared<const Pinhole>(p->fx * (1 + e.focal), p->fy * (1 + e.focal), p->cx, p->cy);
         c.T_mount_camera.q = c.T_mount_camera.q * turn;
     }
     for (Lidar& l : scene.lidars) l.T_mount_lidar.q = l.T_mount_lidar.q * turn;

@@ -10,6 +10,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -132,8 +133,7 @@ TEST(DenseBound, ErrorsOfNoiseReachTheBound) {
     ASSERT_TRUE(render_scene);
     Camera camera;
     camera.width = camera.height = 112;
-    camera.fx = camera.fy = 300;
-    camera.cx = camera.cy = 55.5;
+    test::set_pinhole(camera, 300, 300, 55.5, 55.5);
     camera.format = PixelFormat::y16;
     camera.detector = Detector{.exposure_s = 3e-5,
                                .full_well_e = 13500,

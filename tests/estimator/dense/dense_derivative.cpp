@@ -13,6 +13,7 @@
 #include "estimator/dense/image_derivative.h"
 #include "estimator/view/model_view.h"
 #include "renderer/scene_file/scene_file.h"
+#include "tests/support/cameras.h"
 #include "tests/support/paths.h"
 #include "tests/support/shapes.h"
 
@@ -24,8 +25,7 @@ constexpr int kNodes = 4;  ///< of the integral, at the middles of as many parts
 Camera pinhole(int size, double f) {
     Camera c;
     c.width = c.height = size;
-    c.fx = c.fy = f;
-    c.cx = c.cy = 0.5 * (size - 1);
+    test::set_pinhole(c, f, f, 0.5 * (size - 1), 0.5 * (size - 1));
     return c;
 }
 
@@ -239,7 +239,7 @@ TEST(ImageDerivative, OfTheDockingScene) {
     r.fineness = 8;
     r.rays_per_pixel = 200;
     Camera camera = pinhole(40, 400);
-    camera.cx = 10, camera.cy = 5;
+    test::set_principal_point(camera, 10, 5);
     const auto errors = relative_errors(*render_scene, camera, 0, inverse(T_world_camera), r);
     for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(errors[k], 0.17) << "column " << k;
 }
@@ -253,7 +253,7 @@ TEST(ImageDerivative, IsOfTheChosenPixelsOnly) {
     const Rigid3 pose = inverse(
         Rigid3{scene->bodies[1].initial.T_world_body.q * scene->cameras[0].T_mount_camera.q, {10, 0.4, -0.3}});
     Camera camera = pinhole(40, 400);
-    camera.cx = 10, camera.cy = 5;
+    test::set_principal_point(camera, 10, 5);
     const BodyPoses at = placement_of(*scene);
     ImageDerivative derivative(*render_scene, camera, 0, at);
     const auto by = [&](std::span<const std::uint8_t> chosen) {

@@ -114,7 +114,7 @@ TEST_F(CrpDerivatives, OfTheRefinementWithCovariancesAndLosses) {
             covariances.push_back({a * a + b * b, b * c, c * c});
         }
         PnpPoints points(32);
-        points.assign({camera, body, pixels, 1, covariances});
+        points.assign({&camera, body, pixels, 1, covariances});
         const CentredPose pose = points.centred(T);
         for (const Loss kind : {Loss::none, Loss::cauchy}) {
             const RobustLoss loss{kind, 1.7};

@@ -95,7 +95,7 @@ TEST_F(PnpReference, BoundRefusesWhatHasNone) {
     EXPECT_NE(degenerate.error().what.find("line"), std::string::npos) << degenerate.error().what;
     const test::Seen seen = test::see(random_, test::random_points(random_, 6, 1), truth, 0);
     EXPECT_FALSE(pnp_bound(seen.input(), {{}, {0, 0, -10}}));
-    EXPECT_FALSE(pnp_bound({seen.camera, {seen.body_m.data(), 2}, {seen.pixels.data(), 2}}, truth));
+    EXPECT_FALSE(pnp_bound({&seen.camera, {seen.body_m.data(), 2}, {seen.pixels.data(), 2}}, truth));
 }
 
 TEST(NormalEquations, AreSolvedAndInverted) {

@@ -31,7 +31,7 @@ struct Seen {
     std::vector<Pixel> pixels;
     double sigma_px = 1;
 
-    [[nodiscard]] PnpInput input() const { return {camera, body_m, pixels, sigma_px}; }
+    [[nodiscard]] PnpInput input() const { return {&camera, body_m, pixels, sigma_px}; }
 };
 
 /// sigma_px 0: exact pixels, for which the solver gets 1 px.

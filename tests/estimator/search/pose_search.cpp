@@ -12,6 +12,7 @@
 #include <random>
 #include <string>
 
+#include "base/constants.h"
 #include "estimator/search/attitude_grid.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
@@ -90,7 +91,7 @@ public:
         body.name = "target";
         body.shape = 0;
         scene_.bodies.push_back(std::move(body));
-        camera_.fx = camera_.fy = 115;
+        test::set_pinhole(camera_, 115, 115, test::pinhole_of(camera_).cx, test::pinhole_of(camera_).cy);
         camera_.format = PixelFormat::y16;
         render_scene_.emplace(*RenderScene::create(scene_));
         search_.emplace(*render_scene_, camera_, 0);

@@ -9,7 +9,7 @@
 
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/stereo/stereo_matcher.h"
-#include "renderer/projection/distortion.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -23,7 +23,7 @@ constexpr double kFocal_px = 600;
 Camera stereo_camera() {
     Camera c;
     c.width = c.height = kSize;
-    c.fx = c.fy = kFocal_px, c.cx = c.cy = (kSize - 1) / 2.0;
+    test::set_pinhole(c, kFocal_px, kFocal_px, (kSize - 1) / 2.0, (kSize - 1) / 2.0);
     c.format = PixelFormat::y16;
     Detector d;
     d.read_noise_e = 13, d.full_well_e = 13500, d.black_level_dn = 64, d.bits = 12, d.shot_noise = true;
@@ -65,11 +65,10 @@ Paint waves() {
 
 MeasuredImage picture(const Camera& c, const Rigid3& T_left_camera, const Plane& plane, const Paint& paint) {
     MeasuredImage image{c.width, c.height, {}};
-    const CameraModelHandle model(c);
     for (int v = 0; v < c.height; ++v)
         for (int u = 0; u < c.width; ++u) {
             const Vec3 direction =
-                T_left_camera.q * model->direction({static_cast<double>(u), static_cast<double>(v)});
+                T_left_camera.q * c.model->direction({static_cast<double>(u), static_cast<double>(v)});
             const Vector3d p = plane.met(to_eigen(T_left_camera.t), to_eigen(direction));
             image.dn.push_back(static_cast<float>(paint(p.x(), p.y())));
         }
@@ -100,11 +99,12 @@ StereoSettings settings() {
 }
 
 Vector3d truth(const Camera& c, const Plane& plane, const Vector2d& px) {
-    return plane.met(Vector3d::Zero(), {(px.x() - c.cx) / c.fx, (px.y() - c.cy) / c.fy, 1});
+    return plane.met(Vector3d::Zero(), to_eigen(c.model->on_plane({px.x(), px.y()})));
 }
 Vector2d right_px(const StereoPair& pair, const Vector3d& point) {
     const Vec3 p = pair.T_right_left * to_vec3(point);
-    return {pair.right.fx * p.x / p.z + pair.right.cx, pair.right.fy * p.y / p.z + pair.right.cy};
+    const Pinhole c = test::pinhole_of(pair.right);
+    return {c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy};
 }
 
 const Rigid3 kAside{{}, {-4, 0, 0}}, kAbove{{}, {0, -4, 0}}, kDown{{}, {-4, 0, -7}},
@@ -158,7 +158,7 @@ INSTANTIATE_TEST_SUITE_P(Baselines, StereoMatching, testing::Values(kAside, kAbo
 
 TEST(StereoMatcher, MatchesThroughLensesThatDistort) {
     Camera barrel = stereo_camera();
-    barrel.model = distorted(pinhole_of(barrel), {Distortion::Model::opencv, {-0.8, 0.4, 2e-3, -1e-3}});
+    barrel.model = test::brown_conrady(test::pinhole_of(barrel), {-0.8, 0.4, 2e-3, -1e-3});
     Views v = views(kTurned, waves(), {}, barrel);
     add_noise(barrel, 1, v.left), add_noise(barrel, 2, v.right);
     const auto found = match_stereo(v.pair, v.left, v.right, settings());
@@ -305,9 +305,8 @@ TEST(SplineImage, PassesThroughThePixelsWithItsSlope) {
 }
 
 TEST(EpipolarWarp, FollowsThePointAlongTheLine) {
-    Camera from = stereo_camera(), to = stereo_camera();
-    to.fx = 500, to.fy = 550, to.cx = 100;
-    const EpipolarWarp warp(pinhole_of(from), pinhole_of(to), kTurned);
+    const Pinhole from = test::pinhole_of(stereo_camera()), to{500, 550, 100, from.cy};
+    const EpipolarWarp warp(from, to, kTurned);
     const Vector2d left(30, 190);
     const Vector3d ray = warp.ray(left);
     for (const double depth : {20.0, 100.0, 1e4}) {

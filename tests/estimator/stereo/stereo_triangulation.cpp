@@ -7,6 +7,7 @@
 
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/stereo/triangulation.h"
+#include "tests/support/cameras.h"
 #include "tests/support/oracle.h"
 
 namespace narpa {
@@ -21,7 +22,7 @@ constexpr double kPaperFocal_px = 1319.4792168823421;  // 500 x 500, 30 degrees 
 
 StereoPair pair_with(const Rigid3& T_right_left, double focal_px = kPaperFocal_px) {
     StereoPair pair;
-    pair.left.fx = pair.left.fy = pair.right.fx = pair.right.fy = focal_px;
+    for (Camera* camera : {&pair.left, &pair.right}) test::set_pinhole(*camera, focal_px, focal_px, 0, 0);
     pair.T_right_left = T_right_left;
     return pair;
 }
@@ -32,7 +33,8 @@ StereoPair descent_pair() {
 }
 
 Vector2d seen(const Camera& camera, const Vector3d& p) {
-    return {camera.fx * p.x() / p.z() + camera.cx, camera.fy * p.y() / p.z() + camera.cy};
+    const Pinhole c = test::pinhole_of(camera);
+    return {c.fx * p.x() / p.z() + c.cx, c.fy * p.y() / p.z() + c.cy};
 }
 Vector2d left_of(const StereoPair& pair, const Vector3d& p) {
     return seen(pair.left, p);
@@ -232,7 +234,7 @@ TEST(StereoTriangulation, RefusesInvalidMeasurements) {
     indefinite.covariance_px2(0, 1) = indefinite.covariance_px2(1, 0) = 1;
     EXPECT_TRUE(refused(good, px, indefinite));
     StereoPair bad = good;
-    bad.right.fx = 0;
+    test::set_pinhole(bad.right, 0, kPaperFocal_px, 0, 0);
     EXPECT_TRUE(refused(bad, px, px));
     bad = good, bad.T_right_left.q = {2, 0, 0, 0};
     EXPECT_TRUE(refused(bad, px, px));

@@ -87,7 +87,7 @@ TEST(ModelUncertainty, ShiftsAreThoseOfTheFit) {
         std::vector<Pixel> pixels;
         for (const Vec3& p : body)
             pixels.push_back(test::project(camera, exp_rotation(boresight) * (T * (scale * p + mesh_m))));
-        const PnpFit& fit = refiner.refine({test::kPaperCamera, body, pixels, 1e-3}, T);
+        const PnpFit& fit = refiner.refine({&test::kPaperCamera, body, pixels, 1e-3}, T);
         EXPECT_TRUE(fit.ok());
         return error_between(fit.T_camera_body, T);
     };
@@ -122,7 +122,7 @@ TEST(ModelUncertainty, FocalLengthShiftIsThatOfTheWeightedPoints) {
     std::vector<Pixel> pixels;
     for (const Vec3& p : body) pixels.push_back(test::project(camera, T * p));
     PnpRefiner refiner(8);
-    const PnpInput input{test::kPaperCamera, body, pixels, 1e-3};
+    const PnpInput input{&test::kPaperCamera, body, pixels, 1e-3};
     const PnpFit& fit = refiner.refine(input, T);
     ASSERT_TRUE(fit.ok());
     const Vector6 moved = error_between(T, fit.T_camera_body), told = kPart * shift_by_focal(input, T);

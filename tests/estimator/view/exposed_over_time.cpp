@@ -9,8 +9,8 @@
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pnp/pnp.h"
 #include "renderer/camera/detector.h"
-#include "renderer/projection/distortion.h"
 #include "tests/estimator/pnp/pnp_support.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -119,8 +119,7 @@ protected:
         camera.detector->quantum_efficiency = 2e-3 * 0.04 / GetParam().exposure_s;
         camera.shutter = Shutter{GetParam().row_ns};
         if (GetParam().distorts)
-            camera.model =
-                distorted(pinhole_of(camera), {Distortion::Model::opencv, {-0.35, 0.15, 1e-3, -8e-4, -0.03}});
+            camera.model = test::brown_conrady(test::pinhole_of(camera), {-0.35, 0.15, 1e-3, -8e-4, -0.03});
         if (GetParam().blurs) camera.point_spread = PointSpreadFunction{.sigma_px = 0.8};
     }
     /// A frame of a camera that moves as `velocity` and `rate`, world axes, have it.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "renderer/camera/detector.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -16,7 +17,7 @@ constexpr int kWidth_px = 128, kHeight_px = 96;
 Camera camera_with(PixelFormat format, bool detector) {
     Camera c;
     c.width = kWidth_px, c.height = kHeight_px;
-    c.fx = c.fy = 200, c.cx = 63.5, c.cy = 47.5;
+    test::set_pinhole(c, 200, 200, 63.5, 47.5);
     c.format = format;
     c.white_radiance = 250;
     if (detector) {
@@ -158,8 +159,9 @@ TEST(CoarserCamera, SeesTheSameDirections) {
     const Camera fine = camera_with(PixelFormat::grey, false), coarse = coarser_camera(fine, 4);
     EXPECT_EQ(coarse.width, 32);
     // The coarse pixel (3, 5) covers the fine ones 12..15 and 20..23; its middle is theirs.
-    EXPECT_NEAR((3 - coarse.cx) / coarse.fx, (13.5 - fine.cx) / fine.fx, 1e-15);
-    EXPECT_NEAR((5 - coarse.cy) / coarse.fy, (21.5 - fine.cy) / fine.fy, 1e-15);
+    const Vec3 by_coarse = coarse.model->on_plane({3, 5}), by_fine = fine.model->on_plane({13.5, 21.5});
+    EXPECT_NEAR(by_coarse.x, by_fine.x, 1e-15);
+    EXPECT_NEAR(by_coarse.y, by_fine.y, 1e-15);
 }
 
 TEST(CoarserImage, TakesMeans) {

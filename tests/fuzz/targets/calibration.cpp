@@ -14,12 +14,9 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const auto calibration = read_calibration(file);
     if (!fuzz::count(bool(calibration)))
         return fuzz::require(!calibration.error().what.empty(), "an error has words"), 0;
-    fuzz::require(calibration->width > 0 && calibration->height > 0 && calibration->pinhole.is_valid(),
-                  "it is valid");
-    if (!calibration->distortion) return 0;
-    const auto model = distorted(calibration->pinhole, *calibration->distortion);
-    fuzz::require(model != nullptr, "a distortion has a model");
-    const Vec3 d = model->direction({0.5 * calibration->width, 0.25 * calibration->height});
-    fuzz::require(std::abs(norm(d) - 1) < 1e-9 || !model->is_valid(), "directions are unit");
+    fuzz::require(calibration->width > 0 && calibration->height > 0 && calibration->model, "it is valid");
+    fuzz::require(calibration->model->parameters().pinhole.is_valid(), "its intrinsics are valid");
+    const Vec3 d = calibration->model->direction({0.5 * calibration->width, 0.25 * calibration->height});
+    fuzz::require(std::abs(norm(d) - 1) < 1e-9 || !calibration->model->is_valid(), "directions are unit");
     return 0;
 }

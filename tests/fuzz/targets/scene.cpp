@@ -25,8 +25,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     }
     for (const Camera& c : scene->cameras) {
         fuzz::require(c.mount < bodies && is_unit(c.T_mount_camera.q), "a camera is mounted");
-        fuzz::require(c.fx > 0 && c.fy > 0 && c.period_ns > 0 && std::isfinite(c.fx),
-                      "a camera has a field of view");
+        fuzz::require(c.model && c.model->is_valid() && c.period_ns > 0, "a camera has a field of view");
         fuzz::require(!c.lens || (c.lens->aperture_diameter_m > 0 && c.lens->focus_distance_m > 0), "a lens");
     }
     for (const Body& b : scene->bodies) fuzz::require(is_unit(b.initial.T_world_body.q), "an attitude is unit");

@@ -6,8 +6,10 @@
 #include "renderer/assets/calibration_file.h"
 #include "renderer/assets/lidar_calibration.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/projection/double_sphere.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -36,11 +38,11 @@ TEST(CalibrationFile, OfRosIsRead) {
     ASSERT_TRUE(c) << c.error().text();
     EXPECT_EQ(c->width, 640);
     EXPECT_EQ(c->height, 480);
-    EXPECT_EQ(c->pinhole.fy, 605.2);
-    EXPECT_EQ(c->pinhole.cx, 325.3);
-    ASSERT_TRUE(c->distortion);
-    EXPECT_EQ(c->distortion->model, Distortion::Model::opencv);
-    EXPECT_EQ(c->distortion->coefficients, (std::vector<double>{-0.35, 0.14, 0.0012, -0.0008, -0.025}));
+    const ProjectionParameters p = c->model->parameters();
+    EXPECT_EQ(p.pinhole.fy, 605.2);
+    EXPECT_EQ(p.pinhole.cx, 325.3);
+    EXPECT_EQ(p.kind, &kBrownConrady);
+    EXPECT_EQ(p.values, (std::vector<double>{-0.35, 0.14, 0.0012, -0.0008, -0.025}));
 }
 
 TEST(CalibrationFile, OfOpenCvIsRead) {
@@ -53,36 +55,47 @@ TEST(CalibrationFile, OfOpenCvIsRead) {
     file.release();
     const auto c = read_calibration(path);
     ASSERT_TRUE(c) << c.error().text();
-    EXPECT_EQ(c->pinhole.fx, 250);
-    ASSERT_TRUE(c->distortion);
-    EXPECT_EQ(c->distortion->model, Distortion::Model::fisheye);
-    EXPECT_EQ(c->distortion->coefficients, (std::vector<double>{-0.03, 0.01, -0.004, 6e-4}));
+    const ProjectionParameters p = c->model->parameters();
+    EXPECT_EQ(p.pinhole.fx, 250);
+    EXPECT_EQ(p.kind, &kKannalaBrandt);
+    EXPECT_EQ(p.values, (std::vector<double>{-0.03, 0.01, -0.004, 6e-4}));
 }
 
 TEST(CalibrationFile, WhatIsWrittenIsReadByUsAndByOpenCv) {
     const MemoryFolder folder;
-    const std::vector<std::optional<Distortion>> all{
-        std::nullopt, Distortion{Distortion::Model::opencv, {0.1, -0.2, 0.001, 1.0 / 3}},
-        Distortion{Distortion::Model::opencv, {0.6, 0.05, 5e-4, 3e-4, 0.01, 0.95, 0.15, 0.02}},
-        Distortion{Distortion::Model::fisheye, {-0.02, 0.005, -0.003, 4e-4}}};
-    for (const auto& distortion : all) {
-        const Calibration c{640, 480, {610.1, 605, 325.3, 1.0 / 7}, distortion};
-        const std::string path = folder.write("c.yaml", calibration_text("nav", c));
+    const Pinhole pinhole{610.1, 605, 325.3, 1.0 / 7};
+    const std::vector<ProjectionParameters> all{
+        {&kPinhole, pinhole},
+        {&kBrownConrady, pinhole, {0.1, -0.2, 0.001, 1.0 / 3}},
+        {&kBrownConrady, pinhole, {0.6, 0.05, 5e-4, 3e-4, 0.01, 0.95, 0.15, 0.02}},
+        {&kKannalaBrandt, pinhole, {-0.02, 0.005, -0.003, 4e-4}}};
+    for (const ProjectionParameters& p : all) {
+        const Calibration c{640, 480, make_projection(p)};
+        const auto text = calibration_text("nav", c);
+        ASSERT_TRUE(text) << text.error().text();
+        const std::string path = folder.write("c.yaml", *text);
         const auto back = read_calibration(path);
         ASSERT_TRUE(back) << back.error().text();
         EXPECT_EQ(back->width, c.width);
-        EXPECT_EQ(back->pinhole.cy, c.pinhole.cy);
-        ASSERT_EQ(back->distortion.has_value(), distortion.has_value());
+        const ProjectionParameters found = back->model->parameters();
+        EXPECT_EQ(found.pinhole.cy, pinhole.cy);
+        EXPECT_EQ(found.kind, p.kind);
+        EXPECT_EQ(found.values, p.values);
         const cv::FileStorage file(path, cv::FileStorage::READ);
         cv::Mat1d K, k;
         file["camera_matrix"] >> K;
         file["distortion_coefficients"] >> k;
-        EXPECT_EQ(K(0, 0), c.pinhole.fx);
-        if (!distortion) continue;
-        EXPECT_EQ(back->distortion->model, distortion->model);
-        EXPECT_EQ(back->distortion->coefficients, distortion->coefficients);
-        EXPECT_EQ(std::vector<double>(k.begin(), k.end()), distortion->coefficients);
+        EXPECT_EQ(K(0, 0), pinhole.fx);
+        EXPECT_EQ(std::vector<double>(k.begin(), k.end()), p.kind == &kPinhole ? std::vector<double>(5) : p.values);
     }
+}
+
+TEST(CalibrationFile, RefusesProjectionsThatOpenCvAndRosDoNotName) {
+    const auto text = calibration_text(
+        "nav", {640, 480, make_projection({&kDoubleSphere, {300, 300, 319.5, 239.5}, {-0.2, 0.6}})});
+    ASSERT_FALSE(text);
+    EXPECT_NE(text.error().what.find("cannot state its projection, double_sphere"), std::string::npos)
+        << text.error().what;
 }
 
 TEST(CalibrationFile, ErrorsNameTheLine) {
@@ -115,8 +128,8 @@ TEST(SceneCalibration, GivesSizeIntrinsicsAndDistortion) {
     ASSERT_TRUE(scene) << scene.error().text();
     const Camera& c = scene->cameras[0];
     EXPECT_EQ(c.width, 640);
-    EXPECT_EQ(c.fx, 610.5);
     ASSERT_TRUE(c.model);
+    EXPECT_EQ(c.model->parameters().pinhole.fx, 610.5);
     EXPECT_EQ(c.model->pinhole(), nullptr);
     const auto principal = c.model->project({0, 0, 1});
     ASSERT_TRUE(principal);
@@ -148,7 +161,7 @@ TEST(SceneDistortion, FieldsOfViewAreThoseOfTheDistortedImage) {
                               "\ndistortion = {model = \"fisheye\", coefficients = [-0.03, 0.01, -0.004, 6e-4]}\n");
         const auto scene = read_scene(path);
         ASSERT_TRUE(scene) << scene.error().text();
-        const CameraModelHandle model(scene->cameras[0]);
+        const CameraModel* model = scene->cameras[0].model.get();
         const bool diagonal = std::string(field).starts_with("fov_diagonal");
         const Vec3 a = model->direction({-0.5, diagonal ? -0.5 : 239.5}),
                    b = model->direction({639.5, diagonal ? 479.5 : 239.5});

@@ -7,6 +7,7 @@
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/camera_image.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -227,8 +228,7 @@ TEST(CameraFrame, AllocatesNothingAfterTheFirstFrame) {
 
 TEST(CameraFrame, RaysPassThroughPixelCentres) {
     Camera c = camera(640, 480, 700);
-    c.cx = 300;
-    c.cy = 250;
+    set_principal_point(c, 300, 250);
     const Ray axis = camera_ray(c, {}, 300, 250);
     EXPECT_EQ(axis.direction, (Vec3{0, 0, 1}));
     const Vec3 right = camera_ray(c, {}, 301, 250).direction, down = camera_ray(c, {}, 300, 251).direction;

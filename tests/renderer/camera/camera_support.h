@@ -7,6 +7,7 @@
 
 #include "renderer/atmosphere/air.h"
 #include "renderer/frame/camera_image.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa::test {
@@ -40,12 +41,13 @@ inline RadianceImage rendered(const Scene& scene, const Camera& c, const CameraP
 
 /// Irradiance at the camera in the green band, W m^-2: radiance times solid angle over all pixels.
 inline double irradiance(const RadianceImage& image, const Camera& c) {
+    const Pinhole p = pinhole_of(c);
     double sum = 0;
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
-            const double u = (x - c.cx) / c.fx, v = (y - c.cy) / c.fy, cosine = 1 / std::sqrt(1 + u * u + v * v);
+            const double u = (x - p.cx) / p.fx, v = (y - p.cy) / p.fy, cosine = 1 / std::sqrt(1 + u * u + v * v);
             sum += static_cast<double>(image.pixels[static_cast<std::size_t>(y * image.width + x)].y) * cosine *
-                   cosine * cosine / (c.fx * c.fy);
+                   cosine * cosine / (p.fx * p.fy);
         }
     return sum;
 }

@@ -6,6 +6,7 @@
 
 #include "renderer/camera/camera_pose.h"
 #include "tests/renderer/camera/camera_support.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -58,7 +59,7 @@ double value(const RadianceImage& image, int x, int y) {
 
 /// Mean of column x of the blurred edge: the part of the pixel that the edge has passed, averaged over the time.
 double blurred_edge(int x) {
-    const double end = kCamera.cx - 0.5 * kShift_px;
+    const double end = pinhole_of(kCamera).cx - 0.5 * kShift_px;
     const auto integral = [&](double at) {  // of the ramp from `end` over kShift_px, from -infinity on
         const double s = (at - end) / kShift_px;
         return kShift_px * (s < 0 ? 0 : s < 1 ? 0.5 * s * s : s - 0.5);
@@ -126,7 +127,8 @@ TEST(RollingShutter, SlantsAnUprightEdgeByVelocityTimesRowTime) {
     constexpr double kRowTime = 1.0 / (kHeight - 1);  // each row shows one moment: sharp
     const std::vector<double> edge = edge_by_row(rendered(scene, kCamera, passing(kRowTime), {.spp = 64}));
     for (int y = 0; y < kHeight; ++y)
-        EXPECT_NEAR(edge[static_cast<std::size_t>(y)], kCamera.cx - kShift_px * (y * kRowTime - 0.5), 1.0 / 32)
+        EXPECT_NEAR(edge[static_cast<std::size_t>(y)], pinhole_of(kCamera).cx - kShift_px * (y * kRowTime - 0.5),
+                    1.0 / 32)
             << y;
     EXPECT_NEAR(slope(edge), -kShift_px * kRowTime, 2e-4);
     // One sample a pixel meets the edge in whole pixels.
@@ -139,7 +141,9 @@ TEST(RollingShutter, BlursEachRowOverItsOwnExposure) {
     constexpr double kRowTime = 0.5 / (kHeight - 1);
     const RadianceImage image = rendered(scene, kCamera, passing(kRowTime), {.spp = 256});
     EXPECT_NEAR(slope(edge_by_row(image)), -kShift_px * kRowTime, 1e-3);
-    const auto row_end = [&](int y) { return kCamera.cx + 0.5 * kShift_px - kShift_px * (y * kRowTime + 0.5); };
+    const auto row_end = [&](int y) {
+        return pinhole_of(kCamera).cx + 0.5 * kShift_px - kShift_px * (y * kRowTime + 0.5);
+    };
     for (int y = 0; y < kHeight; y += 9) {
         const int middle = static_cast<int>(std::lround(row_end(y) + 0.25 * kShift_px));
         EXPECT_NEAR(value(image, middle, y), (middle - row_end(y)) / (0.5 * kShift_px), 0.1) << y;

@@ -3,6 +3,7 @@
 
 #include "base/constants.h"
 #include "tests/renderer/camera/camera_support.h"
+#include "tests/support/cameras.h"
 #include "tests/support/lens_ray.h"
 #include "tests/support/oracle.h"
 
@@ -89,11 +90,12 @@ TEST(Lens, AnEdgeOutOfFocusIsSpreadOverTheCircleOfConfusion) {
             const double wide = 100 * depth;
             add_mesh(s, plate(wide, wide), {{0, 1, 0, 0}, {wide / 2, 0, depth}});  // its edge on the axis
             const RadianceImage image = rendered(s, c, {}, {.spp = 1024});
-            const double blur = circle_of_confusion_px(*c.lens, c.fx, depth);
+            const double blur = circle_of_confusion_px(*c.lens, pinhole_of(c).fx, depth);
             EXPECT_GT(blur, 3);
             for (int x = 0; x < c.width; ++x) {
                 double expected = 0;  // the pixel is a window one wide
-                for (int k = 0; k < 16; ++k) expected += beyond_edge(x - c.cx + (k + 0.5) / 16 - 0.5, blur) / 16;
+                for (int k = 0; k < 16; ++k)
+                    expected += beyond_edge(x - pinhole_of(c).cx + (k + 0.5) / 16 - 0.5, blur) / 16;
                 // 1024 stratified samples of a step: the error of each is below 1 / 64.
                 EXPECT_NEAR(static_cast<double>(image.pixels[static_cast<std::size_t>(x)].x), expected, 0.012)
                     << "depth " << depth << " focus " << focus << " x " << x;
@@ -105,7 +107,7 @@ TEST(Lens, AFarPointIsADiscOfTheCircleOfConfusionAndKeepsItsLight) {
     // A shining ball 0.2 px wide, behind the plane of focus: its blur is 14 px wide.
     const double depth = 500, radius = 0.1 * depth / 700;
     const Camera c = with_lens(camera(41, 41, 700), 0.1, 4.9);
-    const double blur = circle_of_confusion_px(*c.lens, c.fx, depth);
+    const double blur = circle_of_confusion_px(*c.lens, pinhole_of(c).fx, depth);
     Scene s = emitting_ball();
     add_sphere(s, radius, {0.3 * depth / 700, -0.2 * depth / 700, depth});
     const RadianceImage image = rendered(s, c, {}, {.spp = 4});
@@ -113,7 +115,7 @@ TEST(Lens, AFarPointIsADiscOfTheCircleOfConfusionAndKeepsItsLight) {
     for (int y = 0; y < c.height; ++y)
         for (int x = 0; x < c.width; ++x) {
             const double l = static_cast<double>(image.pixels[static_cast<std::size_t>(y * c.width + x)].x);
-            const double dx = x - c.cx - 0.3, dy = y - c.cy + 0.2;
+            const double dx = x - pinhole_of(c).cx - 0.3, dy = y - pinhole_of(c).cy + 0.2;
             sum += l, x1 += l * dx, y1 += l * dy, r2 += l * (dx * dx + dy * dy);
             if (std::hypot(dx, dy) > 0.5 * blur + 0.2 + std::sqrt(0.5)) outside += l;
         }

@@ -4,6 +4,7 @@
 #include "renderer/camera/detector.h"
 #include "tests/renderer/camera/star_support.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -27,11 +28,11 @@ TEST(Stars, CentroidsAreWithinAHundredthOfAPixel) {
         CameraRenderer renderer(*render_scene, c);
         for (int i = 0; i < 40; ++i) {
             const ImagePoint p{50 + offset(random), 50 + offset(random)};
-            const Vec3 d = CameraModelHandle(c)->direction(p);
+            const Vec3 d = c.model->direction(p);
             // Turns the camera so that the star is at p.
             const Rigid3 T_world_camera{
                 exp_rotation({std::asin(d.y), 0, 0}) * exp_rotation({0, -std::atan2(d.x, d.z), 0}), {}};
-            const auto wanted = CameraModelHandle(c)->project(conjugate(T_world_camera.q) * Vec3{0, 0, 1});
+            const auto wanted = c.model->project(conjugate(T_world_camera.q) * Vec3{0, 0, 1});
             RadianceImage image(c.width, c.height);
             renderer.render(placed(scene), T_world_camera, {}, image);
             const Spot spot = spot_in(image);
@@ -66,7 +67,8 @@ TEST(Stars, ElectronsAreThoseThatTheApertureCollects) {
         EXPECT_NEAR(electrons_in(rendered(sky({{0.0003, -0.0002, 1}}, 3), c), *c.detector) / wanted, 1, 0.005);
     }
     // Off the axis the aperture is seen from the side: with cos^4 the light falls with the cosine, as it should.
-    c.fx = c.fy = 100, c.vignetting = Vignetting{.cos4 = true};
+    set_pinhole(c, 100, 100, pinhole_of(c).cx, pinhole_of(c).cy);
+    c.vignetting = Vignetting{.cos4 = true};
     c.point_spread = kGaussian;
     EXPECT_NEAR(electrons_in(rendered(sky({{0.6, 0.4, 1}}, 3), c), *c.detector) /
                     (wanted / 100 / std::sqrt(1 + 0.36 + 0.16)),
@@ -86,16 +88,16 @@ TEST(Stars, KeepTheirLightInEveryCamera) {
     const Vec3 direction = normalized(Vec3{0.5, -0.3, 1});
     Camera c = camera(240, 200, 120);
     c.point_spread = kGaussian;
-    for (const auto& distortion : {std::optional<Distortion>{},
-                                   std::optional(Distortion{Distortion::Model::opencv, {-0.2, 0.05, 1e-3, -1e-3}}),
-                                   std::optional(Distortion{Distortion::Model::fisheye, {0.02, -0.01, 0, 0}})}) {
-        if (distortion) c.model = distorted({c.fx, c.fy, c.cx, c.cy}, *distortion);
-        const CameraModelHandle model(c);
+    const Pinhole pinhole = pinhole_of(c);
+    for (const auto& projection : {c.model, brown_conrady(pinhole, {-0.2, 0.05, 1e-3, -1e-3}),
+                                   kannala_brandt(pinhole, {0.02, -0.01, 0, 0})}) {
+        c.model = projection;
+        const CameraModel& model = *c.model;
         const Spot spot = spot_in(rendered(sky({direction}), c));
-        const auto wanted = model->project(direction);
+        const auto wanted = model.project(direction);
         EXPECT_NEAR(spot.x, wanted->x, 0.01);
         EXPECT_NEAR(spot.y, wanted->y, 0.01);
-        EXPECT_NEAR(spot.sum / model->pixels_per_sr(direction) / static_cast<double>(star_irradiance(0, 0.65).y), 1,
+        EXPECT_NEAR(spot.sum / model.pixels_per_sr(direction) / static_cast<double>(star_irradiance(0, 0.65).y), 1,
                     1e-4);
     }
 }

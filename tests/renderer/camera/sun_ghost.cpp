@@ -5,6 +5,7 @@
 
 #include "renderer/camera/scene_camera.h"
 #include "tests/renderer/camera/camera_support.h"
+#include "tests/support/cameras.h"
 
 namespace narpa {
 namespace {
@@ -44,7 +45,8 @@ TEST(SunGhost, HasItsShareOfTheSunsLight) {
     const double right = 0.12, below = -0.05;
     for (const double radius_px : {1.0, 1.7, 5.0, 20.5, 40.0}) {
         const Camera c = with_ghost(radius_px);
-        const double light = centroid_and_light(rendered(sun_at(right, below), c)).z / (c.fx * c.fy);
+        const double light =
+            centroid_and_light(rendered(sun_at(right, below), c)).z / (pinhole_of(c).fx * pinhole_of(c).fy);
         const double cosine = sun_at(right, below).sun->direction.z;
         EXPECT_NEAR(light / (kStrength * kIrradiance * cosine), 1, radius_px < 2 ? 0.04 : 0.005) << radius_px;
     }
@@ -62,9 +64,9 @@ TEST(SunGhost, IsEvenlyLit) {
 }
 
 void expect_opposite_the_sun(const Camera& c, double right, double below) {
-    const CameraModelHandle model(c);
+    const CameraModel& model = *c.model;
     const Scene scene = sun_at(right, below);
-    const auto sun = model->project(scene.sun->direction), axis = model->project({0, 0, 1});
+    const auto sun = model.project(scene.sun->direction), axis = model.project({0, 0, 1});
     ASSERT_TRUE(sun && axis);
     const Vec3 at = centroid_and_light(rendered(scene, c));
     EXPECT_NEAR(at.x, axis->x - c.ghost->scale * (sun->x - axis->x), 0.01);
@@ -73,7 +75,7 @@ void expect_opposite_the_sun(const Camera& c, double right, double below) {
 
 TEST(SunGhost, StandsOppositeTheSunsImage) {
     Camera c = with_ghost();
-    c.cx = 91.3, c.cy = 104;
+    set_principal_point(c, 91.3, 104);
     expect_opposite_the_sun(c, 0.12, -0.07);
     c.ghost->scale = 0.4;
     expect_opposite_the_sun(c, 0.12, -0.07);
@@ -84,11 +86,9 @@ TEST(SunGhost, StandsOppositeTheSunsImage) {
 
 TEST(SunGhost, GoesWithTheDistortedImage) {
     Camera c = with_ghost(15, 0.8);
-    c.distortion = Distortion{Distortion::Model::opencv, {-0.3, 0.1, 0.01, -0.02}};
-    c.model = distorted(pinhole_of(c), *c.distortion);
+    c.model = brown_conrady(pinhole_of(c), {-0.3, 0.1, 0.01, -0.02});
     expect_opposite_the_sun(c, 0.25, -0.2);
-    c.distortion = Distortion{Distortion::Model::fisheye, {0.1, -0.05, 0.02, 0}};
-    c.model = distorted(pinhole_of(c), *c.distortion);
+    c.model = kannala_brandt(pinhole_of(c), {0.1, -0.05, 0.02, 0});
     expect_opposite_the_sun(c, 0.25, -0.2);
 }
 
@@ -116,7 +116,7 @@ TEST(SunGhost, TakesEachRowOfARollingShutterInTurn) {
     const Camera c = with_ghost(60);
     const auto turned = [](double angle) { return Rigid3{exp_rotation({0, angle, 0}), {}}; };
     const RadianceImage image = rendered(sun_at(0, 0), c, {turned(-0.1), turned(0.1), 1.0 / (kGhostSide - 1)});
-    const CameraModelHandle model(c);
+    const CameraModel& model = *c.model;
     for (const int y : {60, 100, 140}) {
         double sum = 0, x_sum = 0;
         for (int x = 0; x < kGhostSide; ++x) {
@@ -124,8 +124,8 @@ TEST(SunGhost, TakesEachRowOfARollingShutterInTurn) {
             sum += light, x_sum += light * x;
         }
         const double angle = -0.1 + 0.2 * y / (kGhostSide - 1.0);
-        const auto sun = model->project({std::sin(-angle), 0, std::cos(angle)});
-        EXPECT_NEAR(x_sum / sum, 2 * c.cx - sun->x, 0.02) << "row " << y;
+        const auto sun = model.project({std::sin(-angle), 0, std::cos(angle)});
+        EXPECT_NEAR(x_sum / sum, 2 * pinhole_of(c).cx - sun->x, 0.02) << "row " << y;
     }
 }
 

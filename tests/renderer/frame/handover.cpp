@@ -4,8 +4,8 @@
 #include "renderer/camera/point_response.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/camera_image.h"
-#include "renderer/projection/distortion.h"
 #include "tests/renderer/camera/camera_support.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -111,7 +111,7 @@ TEST(Handover, PlaceAndFormAreThoseOfAPointBetweenThePixels) {
         for (const auto& [spread, form] : kSpreads)
             for (const bool fisheye : {false, true}) {
                 Camera c = camera(81, 81, kView_px);
-                if (fisheye) c.model = distorted(pinhole_of(c), {Distortion::Model::fisheye, {0.1, -0.02, 0, 0}});
+                if (fisheye) c.model = kannala_brandt(pinhole_of(c), {0.1, -0.02, 0, 0});
                 c.point_spread = spread;
                 CameraRenderer renderer(*render_scene, c);
                 const PointResponse response(spread, 0);
@@ -120,7 +120,7 @@ TEST(Handover, PlaceAndFormAreThoseOfAPointBetweenThePixels) {
                     const double distance_m = 2 * kRadius_m * kView_px / diameter_px;
                     const ImagePoint p{40 + place(random), 40 + place(random)};
                     BodyPoses at(1);
-                    at.set(0, {{}, distance_m * CameraModelHandle(c)->direction(p)});
+                    at.set(0, {{}, distance_m * c.model->direction(p)});
                     renderer.render(at, {}, {.spp = 16}, image);
                     const LightSpot seen = blob(image);
                     EXPECT_NEAR(seen.x, p.x, 0.01) << diameter_px << " px";

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "renderer/frame/camera_image.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -213,7 +214,8 @@ TEST(Interval, OfASphereOnAFewThousandthsOfAPixelHoldsTheTruth) {
         int held = 0;
         for (std::uint32_t frame = 0; frame < 20; ++frame) {
             Camera c = camera(9, 9, f);
-            c.cx = 4 + within(random), c.cy = 4 + within(random);
+            const double cx = 4 + within(random);
+            set_principal_point(c, cx, 4 + within(random));
             const Shot shot = shoot_frame(*render_scene, c, looking({distance, 0, 0}, {}), spp, frame);
             const double half = interval_95(static_cast<double>(shot.aovs.variance[4 * 9 + 4]), spp, 16);
             held += std::abs(mean_of(shot.image.pixels[4 * 9 + 4]) - truth) <= half;

@@ -10,6 +10,7 @@
 #include "renderer/material/texture_lookup.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/cameras.h"
 #include "tests/support/oracle.h"
 #include "tests/support/shapes.h"
 
@@ -80,8 +81,8 @@ std::vector<double> fluxes(const Far& far, FrameSettings settings) {
     for (std::uint32_t k = 0; k < 12; ++k) {
         Camera c = far.c;
         const bool special = k < 4;
-        c.cx = 10 + (special ? 0.5 * (k & 1) : shift(random));
-        c.cy = 10 + (special ? 0.25 * (k & 2) : shift(random));
+        const double cx = 10 + (special ? 0.5 * (k & 1) : shift(random));
+        set_principal_point(c, cx, 10 + (special ? 0.25 * (k & 2) : shift(random)));
         settings.frame = k;
         out.push_back(irradiance(render(render_scene, c, far.view(), settings), c));
     }
@@ -98,7 +99,9 @@ TEST(TinyBody, OracleOfThePointSource) {
         const double expected = c["out"]["irradiance_at_camera"];
         ASSERT_EQ(in["radius_m"].get<double>(), 5);
         Far far(distance, phase, albedo);
-        far.c.fx = far.c.fy = in["f_px"];
+        const double f_px = in["f_px"];
+        const Pinhole p = pinhole_of(far.c);
+        set_pinhole(far.c, f_px, f_px, p.cx, p.cy);
         add_sphere(far.scene, 5, {});
         for (const int spp : {1, 4})
             for (const double seen : fluxes(far, {.spp = spp}))
@@ -163,7 +166,8 @@ TEST(TinyBody, LightStaysTheSameWhileItMovesOverPixelsAndBlocks) {
     std::vector<double> seen;
     for (int k = 0; k < 64; ++k) {
         Camera c = far.c;
-        c.cx = 8.5 + 0.11 * k, c.cy = 9.3 + 0.05 * k;  // seven pixels along, over corners of pixels and of blocks
+        set_principal_point(c, 8.5 + 0.11 * k,
+                            9.3 + 0.05 * k);  // seven pixels along, over corners of pixels and of blocks
         seen.push_back(irradiance(render(render_scene, c, far.view()), c));
     }
     const Moments m = moments(seen);
@@ -277,15 +281,14 @@ TEST(TinyBody, IsNoneThatHasAnAtmosphere) {
     Far far(1e10, 1, 0.1);
     add_sphere(far.scene, 6.371e6, {});
     const BodyPoses at = placed(far.scene);
-    const CameraModelHandle model(far.c);
     const auto tracer = Tracer::create(far.scene, 1);
     ASSERT_TRUE(tracer);
-    EXPECT_TRUE(SubpixelBodies(*tracer, at, far.c, model, far.view(), nullptr, false).any());
+    EXPECT_TRUE(SubpixelBodies(*tracer, at, far.c, far.c.model.get(), far.view(), nullptr, false).any());
     far.scene.atmosphere.emplace();
     far.scene.atmosphere->body = 0;
     const auto with_air = Tracer::create(far.scene, 1);
     ASSERT_TRUE(with_air);
-    const SubpixelBodies none(*with_air, at, far.c, model, far.view(), nullptr, false);
+    const SubpixelBodies none(*with_air, at, far.c, far.c.model.get(), far.view(), nullptr, false);
     EXPECT_FALSE(none.any());
     EXPECT_FALSE(none.contains(0));
 }
@@ -293,7 +296,7 @@ TEST(TinyBody, IsNoneThatHasAnAtmosphere) {
 TEST(TinyBody, CoversWhatIsBehindIt) {
     for (const int spp : {1, 4}) {
         Shining w;
-        w.c.cx += 0.23, w.c.cy -= 0.31;
+        w.c.model = w.c.model->windowed(-0.23, 0.31);
         Mesh wall = plate(200, 200);
         wall.face_material.assign(wall.faces.size(), 1);
         add_mesh(w.s, wall, {{0, 1, 0, 0}, {0, 0, 2000}});

@@ -10,6 +10,7 @@
 #include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/mesh_shape.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/cameras.h"
 #include "tests/support/lens_ray.h"
 
 namespace narpa {
@@ -67,8 +68,7 @@ Mesh tube(double length_m, double radius_m, int sides) {
 Camera camera_of(int width, int height, double f_px) {
     Camera c;
     c.width = width, c.height = height;
-    c.fx = f_px, c.fy = 1.1 * f_px;
-    c.cx = 0.47 * width, c.cy = 0.52 * height;
+    test::set_pinhole(c, f_px, 1.1 * f_px, 0.47 * width, 0.52 * height);
     return c;
 }
 
@@ -295,7 +295,7 @@ TEST(TileCulling, ListsAllWhereMoreCrowdThanItCounts) {
     for (int i = 0; i < 40; ++i) scene.bodies.push_back({.name = "sphere", .shape = Sphere{.radius_m = 0.5}});
     const Tracer tracer = tracer_of(scene);
     Camera camera = camera_of(64, 64, 64);
-    camera.cx = camera.cy = 27.5;  // the middle of a tile
+    test::set_principal_point(camera, 27.5, 27.5);  // the middle of a tile
     TileCulling cover(tracer, camera);
     BodyPoses at(scene.bodies.size());
     for (const std::size_t crowd : {TileCulling::kMaxListed, TileCulling::kMaxListed + 1}) {

@@ -7,6 +7,7 @@
 
 #include "renderer/frame/camera_image.h"
 #include "renderer/lidar/lidar_shot.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -148,7 +149,8 @@ TEST(ShapeJoint, AnAddedShapeIsRenderedLitAndShadowed) {
             // Pixels that see one thing alone: what their centre sees, their corners see too.
             enum class Sees { nothing, sunlit, shadow, ball, mixed } sees = Sees::mixed;
             for (const auto& [dx, dy] : {std::pair{0.0, 0.0}, {-0.6, -0.6}, {0.6, -0.6}, {-0.6, 0.6}, {0.6, 0.6}}) {
-                const Vec3 d = T.q * normalized(Vec3{(i + dx - c.cx) / c.fx, (j + dy - c.cy) / c.fy, 1});
+                const Vec3 d = T.q * normalized(Vec3{(i + dx - pinhole_of(c).cx) / pinhole_of(c).fx,
+                                                     (j + dy - pinhole_of(c).cy) / pinhole_of(c).fy, 1});
                 const Hit hit = s.tracer->intersect(s.at, {T.t, d}, kInfinity);
                 const Vec3 p = T.t + s.range_m(T.t, d) * d;
                 const Sees here = hit.body == 1    ? Sees::ball

@@ -4,6 +4,7 @@
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/ellipsoid.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -127,7 +128,8 @@ TEST(EarthFromFourHundredKilometres, LimbIsWithinAHundredthOfAPixelOfTheClosedFo
             // semi-axes^2).
             const Wide squeeze{1 / static_cast<long double>(kEarth.x), 1 / static_cast<long double>(kEarth.y),
                                1 / static_cast<long double>(kEarth.z)};
-            const Vec3 a_camera{(x - c.cx) / c.fx, -c.cy / c.fy, 1}, b_camera{0, 1 / c.fy, 0};
+            const Vec3 a_camera{(x - pinhole_of(c).cx) / pinhole_of(c).fx, -pinhole_of(c).cy / pinhole_of(c).fy, 1},
+                b_camera{0, 1 / pinhole_of(c).fy, 0};
             // The eye as the placement's rounding has it: 4e-8 m.
             const Vec3 eye_body = conjugate(T_world_body.q) * (T_world_camera.t - T_world_body.t);
             const Wide e = vec_cast<long double>(eye_body) * squeeze,

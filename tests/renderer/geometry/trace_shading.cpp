@@ -105,11 +105,11 @@ TEST(Sun, PenumbraOfAStraightEdgeIsTheVisiblePartOfTheDisc) {
     add_mesh(s, plate(100, 100), {{}, {-50, 0, 10}});
     add_sun(s, {0, 0, 1});
     s.sun->angular_diameter_rad = 0.02;
-    Camera c = camera(41, 1, 0);
-    c.fx = c.fy = 41 / 0.24 * 1.0;  // 0.24 m across at 1 m
+    constexpr double kFocal_px = 41 / 0.24 * 1.0;  // 0.24 m across at 1 m
+    const Camera c = camera(41, 1, kFocal_px);
     const RadianceImage image = rendered(s, c, looking({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), {.spp = 1024});
     for (int x = 0; x < 41; ++x) {
-        const double d = (x - 20) / c.fx, cut = std::clamp(d / (10 * std::tan(0.01)), -1.0, 1.0);
+        const double d = (x - 20) / kFocal_px, cut = std::clamp(d / (10 * std::tan(0.01)), -1.0, 1.0);
         const double visible = 1 - (std::acos(cut) - cut * std::sqrt(1 - cut * cut)) / kPi;
         EXPECT_NEAR(static_cast<double>(image.pixels[static_cast<std::size_t>(x)].x) / (kSolar / kPi), visible,
                     0.01)

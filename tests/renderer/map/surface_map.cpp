@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "renderer/frame/camera_image.h"
-#include "renderer/projection/distortion.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -67,8 +67,10 @@ TEST(SurfaceMap, DepthLinesOfATiltedPlaneAreWhereTheyBelong) {
     for (const ContourLine& line : lines)
         for (const ImagePoint& p : line.points) {
             // n . (x, y, f) / f = d / level: a straight line of the image.
-            const double u = (p.x - sight.c.cx) / sight.c.fx, v = (p.y - sight.c.cy) / sight.c.fy;
-            const double off = (n.x * u + n.y * v + n.z - d / line.level) / std::hypot(n.x, n.y) * sight.c.fx;
+            const double u = (p.x - pinhole_of(sight.c).cx) / pinhole_of(sight.c).fx,
+                         v = (p.y - pinhole_of(sight.c).cy) / pinhole_of(sight.c).fy;
+            const double off =
+                (n.x * u + n.y * v + n.z - d / line.level) / std::hypot(n.x, n.y) * pinhole_of(sight.c).fx;
             worst = std::max(worst, std::abs(off));
         }
     EXPECT_EQ(lines.size(), levels.size()) << "one line a level";
@@ -112,7 +114,8 @@ TEST(SurfaceMap, HeightLinesAreInTheFrameOfTheBody) {
             worst_m = std::max(worst_m, std::abs(dot(q.up, on_plate) - q.datum_m - line.level));
             // Where the ray through p meets the plate's plane, and how the height changes there per pixel.
             const auto height = [&](const ImagePoint& at) {
-                const Vec3 ray{(at.x - sight.c.cx) / sight.c.fx, (at.y - sight.c.cy) / sight.c.fy, 1};
+                const Vec3 ray{(at.x - pinhole_of(sight.c).cx) / pinhole_of(sight.c).fx,
+                               (at.y - pinhole_of(sight.c).cy) / pinhole_of(sight.c).fy, 1};
                 const Vec3 n = tilted().q * Vec3{0, 0, 1};
                 const Vec3 met = dot(n, tilted().t) / dot(n, ray) * ray;
                 return dot(q.up, inverse(tilted()) * met) - q.datum_m;
@@ -133,16 +136,17 @@ TEST(SurfaceMap, DepthLinesOfASphereAreCircles) {
     const std::vector<double> levels{8.01, 8.05, 8.2, 8.5, 9, 9.2};
     const auto lines = sight.contours({Kind::depth}, levels);
     ASSERT_EQ(lines.size(), levels.size());
-    const double limb = sight.c.fx * std::tan(std::asin(2.0 / 10));
+    const double limb = pinhole_of(sight.c).fx * std::tan(std::asin(2.0 / 10));
     for (std::size_t i = 0; i < lines.size(); ++i) {
         EXPECT_TRUE(lines[i].closed) << lines[i].level;
-        const double radius = sight.c.fx * std::sqrt(4 - std::pow(10 - levels[i], 2)) / levels[i];
+        const double radius = pinhole_of(sight.c).fx * std::sqrt(4 - std::pow(10 - levels[i], 2)) / levels[i];
         // f'' / (8 f') of linear interpolation: near the peak depth grows as r^2, near the limb as the root of the
         // distance from it.
         const double bound = 1.02 / (8 * radius) + 1 / (16 * (limb - radius - 1));
         double worst = 0;
         for (const ImagePoint& p : lines[i].points)
-            worst = std::max(worst, std::abs(std::hypot(p.x - sight.c.cx, p.y - sight.c.cy) - radius));
+            worst = std::max(
+                worst, std::abs(std::hypot(p.x - pinhole_of(sight.c).cx, p.y - pinhole_of(sight.c).cy) - radius));
         EXPECT_LT(worst, bound) << "level " << levels[i] << ", radius " << radius << " px";
         std::printf("depth lines of a sphere: radius %.1f px: at most %.2g px off\n", radius, worst);
     }
@@ -198,7 +202,8 @@ TEST(SurfaceMap, NoLineCrossesTheOutlineOfWhatIsBefore) {
     SurfaceMap map;
     const auto lines = sight.contours({Kind::height, -1, {0, 1, 0}}, levels, &map);
     const auto direction = [&](const ImagePoint& p) {
-        return normalized(Vec3{(p.x - sight.c.cx) / sight.c.fx, (p.y - sight.c.cy) / sight.c.fy, 1});
+        return normalized(Vec3{(p.x - pinhole_of(sight.c).cx) / pinhole_of(sight.c).fx,
+                               (p.y - pinhole_of(sight.c).cy) / pinhole_of(sight.c).fy, 1});
     };
     const auto on_sphere = [&](const ImagePoint& p) {
         const Vec3 centre{3, 0, 15};
@@ -262,7 +267,7 @@ TEST(SurfaceMap, PixelsBeyondTheImageCircleHaveNoSurface) {
     Scene s = with_materials();
     add_sphere(s, 50, {0, 0, 0});  // all around
     Camera c = camera(101, 101, 60);
-    c.model = distorted({c.fx, c.fy, c.cx, c.cy}, {Distortion::Model::opencv, {-0.35, 0, 0, 0}});
+    c.model = brown_conrady(pinhole_of(c), {-0.35, 0, 0, 0});
     const Sight sight(std::move(s), c);
     const SurfaceMap map = sight.mapper({Kind::range}).map();
     int unseen = 0;

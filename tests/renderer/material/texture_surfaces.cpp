@@ -9,6 +9,7 @@
 #include "renderer/integrator/shading.h"
 #include "renderer/material/texture_lookup.h"
 #include "tests/renderer/material/texture_support.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -43,7 +44,7 @@ public:
         const Ray ray = camera_ray(c, T, x, y);
         hit = tracer_.intersect(at_, ray, kInfinity);
         if (hit.body < 0) return -1;
-        const double width_m = filter ? hit.range_m / c.fx : 0;
+        const double width_m = filter ? hit.range_m / pinhole_of(c).fx : 0;
         return static_cast<double>(surface_at(tracer_, at_, hit, ray.direction, width_m).diffuse.x);
     }
 
@@ -127,7 +128,8 @@ TEST(TexturedPlate, SeenAtEightyDegreesItKeepsTheDetailAcross) {
                           Hit hit;
                           const double seen = look.value(c, T, i % 64, 24 + i / 64, true, hit);
                           if (anisotropic) return seen;
-                          const auto half = static_cast<float>(0.5 * (hit.range_m / c.fx) / std::cos(tilt));
+                          const auto half =
+                              static_cast<float>(0.5 * (hit.range_m / pinhole_of(c).fx) / std::cos(tilt));
                           return static_cast<double>(
                               texture_lookup(look.scene().textures[0], hit.u, hit.v, {{half, 0}, {0, half}}).x);
                       })
@@ -236,7 +238,7 @@ TEST(TexturedGlobe, BeamsAtTheLimbDoNotReachAcrossTheFarSide) {
     int seen = 0;
     for (int i = 0; i < 2000; ++i) {
         const double a = angle(random), r = 25 * (1 - std::pow(inside(random), 2)) - 1e-4;
-        const double v = look.value(c, T, c.cx + r * std::cos(a), c.cy + r * std::sin(a));
+        const double v = look.value(c, T, pinhole_of(c).cx + r * std::cos(a), pinhole_of(c).cy + r * std::sin(a));
         if (v < 0) continue;
         ++seen;
         EXPECT_LT(v, 0.02);

@@ -10,48 +10,49 @@
 #include "renderer/camera/detector.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/camera_image.h"
+#include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
 
 using namespace test;
-using enum Distortion::Model;
 
 const Pinhole kIntrinsics{610, 605, 325.3, 236.8};
-const Distortion kStrongBarrel{opencv, {-0.35, 0.14, 1.2e-3, -8e-4, -0.025}};
-const Distortion kRational{opencv, {0.6, 0.05, 5e-4, 3e-4, 0.01, 0.95, 0.15, 0.02}};
-const Distortion kThinPrism{opencv, {-0.2, 0.05, 1e-3, 1e-3, 0, 0, 0, 0, 2e-3, -1e-3, -3e-3, 5e-4}};
-const Distortion kFisheye{fisheye, {-0.02, 0.005, -0.003, 4e-4}};
+const ProjectionParameters kStrongBarrel{&kBrownConrady, kIntrinsics, {-0.35, 0.14, 1.2e-3, -8e-4, -0.025}};
+const ProjectionParameters kRational{&kBrownConrady, kIntrinsics, {0.6, 0.05, 5e-4, 3e-4, 0.01, 0.95, 0.15, 0.02}};
+const ProjectionParameters kThinPrism{
+    &kBrownConrady, kIntrinsics, {-0.2, 0.05, 1e-3, 1e-3, 0, 0, 0, 0, 2e-3, -1e-3, -3e-3, 5e-4}};
+const ProjectionParameters kFisheye{&kKannalaBrandt, kIntrinsics, {-0.02, 0.005, -0.003, 4e-4}};
 
 cv::Matx33d matrix_of(const Pinhole& p) {
     return {p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1};
 }
 
-ImagePoint by_opencv(const Distortion& d, const Vec3& point) {
+ImagePoint by_opencv(const ProjectionParameters& projection, const Vec3& point) {
     const std::vector<cv::Point3d> points{{point.x, point.y, point.z}};
     std::vector<cv::Point2d> image;
     const cv::Vec3d none(0, 0, 0);
-    if (d.model == fisheye)
-        cv::fisheye::projectPoints(points, image, none, none, matrix_of(kIntrinsics), d.coefficients);
+    if (projection.kind == &kKannalaBrandt)
+        cv::fisheye::projectPoints(points, image, none, none, matrix_of(kIntrinsics), projection.values);
     else
-        cv::projectPoints(points, none, none, matrix_of(kIntrinsics), d.coefficients, image);
+        cv::projectPoints(points, none, none, matrix_of(kIntrinsics), projection.values, image);
     return {image[0].x, image[0].y};
 }
 
 TEST(Distortion, ProjectsAsOpenCvDoes) {
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> side(-0.6, 0.6), range(0.01, 1e4);
-    for (const Distortion& d :
-         {kStrongBarrel, kRational, kThinPrism, kFisheye, Distortion{opencv, {-0.1, 0.02, 0, 1e-3}}}) {
-        const auto model = distorted(kIntrinsics, d);
+    const ProjectionParameters four{&kBrownConrady, kIntrinsics, {-0.1, 0.02, 0, 1e-3}};
+    for (const ProjectionParameters& projection : {kStrongBarrel, kRational, kThinPrism, kFisheye, four}) {
+        const auto model = make_projection(projection);
         ASSERT_TRUE(model);
         for (int i = 0; i < 2000; ++i) {
             const double z = range(random);
             const Vec3 p{z * side(random), z * side(random), z};
             const auto ours = model->project(p);
             ASSERT_TRUE(ours);
-            const ImagePoint theirs = by_opencv(d, p);
+            const ImagePoint theirs = by_opencv(projection, p);
             EXPECT_NEAR(ours->x, theirs.x, 1e-9);
             EXPECT_NEAR(ours->y, theirs.y, 1e-9);
         }
@@ -59,8 +60,8 @@ TEST(Distortion, ProjectsAsOpenCvDoes) {
 }
 
 TEST(Distortion, ImagePointsOfTheWholeFrameComeBack) {
-    for (const Distortion& d : {kStrongBarrel, kRational, kThinPrism, kFisheye}) {
-        const auto model = distorted(kIntrinsics, d);
+    for (const ProjectionParameters& p : {kStrongBarrel, kRational, kThinPrism, kFisheye}) {
+        const auto model = make_projection(p);
         for (double y = -0.5; y < 480; y += 3.7)
             for (double x = -0.5; x < 640; x += 3.7) {
                 ASSERT_TRUE(model->sees({x, y}));
@@ -74,7 +75,7 @@ TEST(Distortion, ImagePointsOfTheWholeFrameComeBack) {
 
 TEST(Distortion, NothingIsSeenWhereTheImageWouldFold) {
     // r - 0.35 r^3 grows up to r = 0.976, where the image radius is 0.650: 397 px.
-    const auto model = distorted(kIntrinsics, {opencv, {-0.35, 0, 0, 0}});
+    const auto model = brown_conrady(kIntrinsics, {-0.35, 0, 0, 0});
     const auto at = [&](double r) { return ImagePoint{kIntrinsics.cx + kIntrinsics.fx * r, kIntrinsics.cy}; };
     EXPECT_TRUE(model->sees(at(0.648)));
     EXPECT_FALSE(model->sees(at(0.652)));
@@ -85,7 +86,7 @@ TEST(Distortion, NothingIsSeenWhereTheImageWouldFold) {
 }
 
 TEST(Distortion, AFisheyeSeesBehindItself) {
-    const auto model = distorted(kIntrinsics, {fisheye, {0, 0, 0, 0}});
+    const auto model = kannala_brandt(kIntrinsics, {0, 0, 0, 0});
     const auto image = model->project({1, 0, -1});
     ASSERT_TRUE(image);
     EXPECT_NEAR(image->x, kIntrinsics.cx + kIntrinsics.fx * 0.75 * kPi, 1e-9);
@@ -122,9 +123,8 @@ protected:
         camera.point_spread = PointSpreadFunction{.sigma_px = 1};
     }
 
-    void take_views(const Pinhole& pinhole, const Distortion& distortion, int views) {
-        camera.fx = pinhole.fx, camera.fy = pinhole.fy, camera.cx = pinhole.cx, camera.cy = pinhole.cy;
-        camera.model = distorted(pinhole, distortion);
+    void take_views(const std::shared_ptr<const CameraModel>& model, int views) {
+        camera.model = model;
         const Scene scene = chessboard(kCorners + 1, kSquare_m);
         auto render_scene = RenderScene::create(scene);
         ASSERT_TRUE(render_scene);
@@ -172,7 +172,7 @@ void expect_found(const std::vector<double>& found, const std::vector<double>& t
 
 TEST_F(Calibration, OfOpenCvFindsBrownConrady) {
     const Pinhole truth{430, 427, 243.1, 176.4};
-    take_views(truth, {opencv, {-0.28, 0.09, 8e-4, -6e-4}}, 20);
+    take_views(brown_conrady(truth, {-0.28, 0.09, 8e-4, -6e-4}), 20);
     cv::Matx33d K = cv::Matx33d::eye();
     std::vector<double> k(5);
     cv::Mat1d sigma;
@@ -206,7 +206,7 @@ std::vector<double> fisheye_sigmas(const std::vector<std::vector<cv::Point3d>>& 
 
 TEST_F(Calibration, OfOpenCvFindsTheFisheye) {
     const Pinhole truth{250, 248, 241.2, 177.7};
-    take_views(truth, {fisheye, {-0.03, 0.01, -0.004, 6e-4}}, 20);
+    take_views(kannala_brandt(truth, {-0.03, 0.01, -0.004, 6e-4}), 20);
     std::vector<std::vector<cv::Point3d>> points;
     std::vector<std::vector<cv::Point2d>> images;
     for (std::size_t i = 0; i < corners.size(); ++i) {

@@ -5,7 +5,9 @@
 
 #include "base/constants.h"
 #include "renderer/frame/tile_culling.h"
+#include "renderer/projection/double_sphere.h"
 #include "tests/renderer/camera/camera_support.h"
+#include "tests/support/cameras.h"
 #include "tests/support/equidistant_camera.h"
 #include "tests/support/lens_ray.h"
 
@@ -14,12 +16,13 @@ namespace {
 
 using namespace test;
 
-const Pinhole kPinhole{400, 440, 130, 95};
+const Pinhole kPinholeLens{400, 440, 130, 95};
 const EquidistantCamera kEquidistant{150, 140, 130, 95};
-const auto kBarrel = distorted(kPinhole, {Distortion::Model::opencv, {-0.1, 0.02, 1e-3, -2e-3, 0.001}});
-const auto kFisheyeLens =
-    distorted({150, 140, 130, 95}, {Distortion::Model::fisheye, {-0.02, 0.004, -0.001, 1e-4}});
-const std::array<const CameraModel*, 4> kModels{&kPinhole, &kEquidistant, kBarrel.get(), kFisheyeLens.get()};
+const auto kBarrel = brown_conrady(kPinholeLens, {-0.1, 0.02, 1e-3, -2e-3, 0.001});
+const auto kFisheyeLens = kannala_brandt({150, 140, 130, 95}, {-0.02, 0.004, -0.001, 1e-4});
+const auto kTwoSpheres = make_projection({&kDoubleSphere, {150, 140, 130, 95}, {-0.2, 0.55}});
+const std::array<const CameraModel*, 5> kModels{&kPinholeLens, &kEquidistant, kBarrel.get(), kFisheyeLens.get(),
+                                                kTwoSpheres.get()};
 
 void expect_consistent(const CameraModel& model, double reach_px, double tolerance) {
     std::mt19937_64 random(1);
@@ -88,12 +91,12 @@ TEST(CameraModel, ConeOfARectangleHoldsItsRays) {
 TEST(CameraModel, ScaledAndWindowedCamerasSeeTheSameRays) {
     Camera pinhole;
     pinhole.width = 260, pinhole.height = 190;
-    pinhole.fx = 400, pinhole.fy = 440, pinhole.cx = 130, pinhole.cy = 95;
+    set_pinhole(pinhole, 400, 440, 130, 95);
     for (const Camera& c : {pinhole, with_equidistant(pinhole, 150)}) {
         const Camera coarse = scaled(c, 1 / 3.0, 0.5), part = windowed(c, 31, 17, 64, 48);
         EXPECT_EQ(coarse.width, 86);
         EXPECT_EQ(coarse.height, 95);
-        const CameraModelHandle whole(c), of_coarse(coarse), of_part(part);
+        const auto &whole = c.model, &of_coarse = coarse.model, &of_part = part.model;
         // Pixel (10, 20) covers columns 30, 31, 32 and rows 40, 41 of the finer image.
         EXPECT_LT(norm(of_coarse->direction({10, 20}) - whole->direction({31, 40.5})), 1e-15);
         EXPECT_LT(norm(of_part->direction({3, 4}) - whole->direction({34, 21})), 1e-15);
@@ -101,8 +104,8 @@ TEST(CameraModel, ScaledAndWindowedCamerasSeeTheSameRays) {
 }
 
 TEST(CameraModel, APinholeHasNoImageOfWhatIsBehindIt) {
-    EXPECT_FALSE(kPinhole.project({0, 0, -1}));
-    EXPECT_FALSE(kPinhole.project({1, 0, 0}));
+    EXPECT_FALSE(kPinholeLens.project({0, 0, -1}));
+    EXPECT_FALSE(kPinholeLens.project({1, 0, 0}));
     EXPECT_TRUE(kEquidistant.project({1, 0, -0.5}));
 }
 

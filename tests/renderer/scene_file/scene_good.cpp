@@ -6,6 +6,7 @@
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
+#include "tests/support/cameras.h"
 #include "tests/support/paths.h"
 
 namespace narpa {
@@ -116,8 +117,8 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
     EXPECT_EQ(c.mount, 1);
     EXPECT_EQ(c.width, 640);
     EXPECT_EQ(c.height, 480);
-    EXPECT_EQ(c.fx, 800);
-    EXPECT_EQ(c.cy, 239.5);
+    EXPECT_EQ(test::pinhole_of(c).fx, 800);
+    EXPECT_EQ(test::pinhole_of(c).cy, 239.5);
     EXPECT_EQ(c.format, PixelFormat::y16);
     EXPECT_EQ(c.period_ns, 33'333'333);
     EXPECT_TRUE(c.embedded_line);
@@ -136,9 +137,9 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
     const Camera& overview = s.cameras[1];
     EXPECT_EQ(overview.mount, -1);
     // 30 degrees over the diagonal of 500 x 500: f = hypot(250, 250) / tan(15 deg) = 1319.479 px
-    EXPECT_NEAR(overview.fx, 1319.479, 5e-4);
-    EXPECT_EQ(overview.fx, overview.fy);
-    EXPECT_EQ(overview.cx, 249.5);
+    EXPECT_NEAR(test::pinhole_of(overview).fx, 1319.479, 5e-4);
+    EXPECT_EQ(test::pinhole_of(overview).fx, test::pinhole_of(overview).fy);
+    EXPECT_EQ(test::pinhole_of(overview).cx, 249.5);
     EXPECT_EQ(overview.period_ns, 400'000'000);
     EXPECT_EQ(overview.white_radiance, 300);
     EXPECT_FALSE(overview.detector);
@@ -222,9 +223,9 @@ TEST(SceneFile, DefaultsAreTheManuals) {
     EXPECT_EQ(s.materials.at(0).diffuse, (Rgb{0.5f, 0.5f, 0.5f}));
     EXPECT_EQ(s.bodies[0].initial.T_world_body, Rigid3{});
     const Camera& c = s.cameras.at(0);
-    EXPECT_NEAR(c.fx, 320, 1e-12);  // 90 degrees over 640 px
-    EXPECT_EQ(c.cx, 319.5);
-    EXPECT_EQ(c.cy, 239.5);
+    EXPECT_NEAR(test::pinhole_of(c).fx, 320, 1e-12);  // 90 degrees over 640 px
+    EXPECT_EQ(test::pinhole_of(c).cx, 319.5);
+    EXPECT_EQ(test::pinhole_of(c).cy, 239.5);
     EXPECT_EQ(c.format, PixelFormat::grey);
     EXPECT_EQ(c.period_ns, 100'000'000);
     EXPECT_FALSE(c.embedded_line);

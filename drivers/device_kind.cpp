@@ -41,7 +41,8 @@ Status check_writable(const std::string& file) {
     while (!fs::exists(at, unknown) && at.has_relative_path()) at = at.parent_path();
     const bool in_a_file = at != fs::absolute(file, unknown) && !fs::is_directory(at, unknown);
     if (!in_a_file && ::access(at.c_str(), W_OK) == 0) return Ok{};
-    return Error{"cannot write " + at.string() + ": " + std::strerror(in_a_file ? ENOTDIR : errno), file, 0, 0, ErrorKind::missing};
+    return Error{"cannot write " + at.string() + ": " + std::strerror(in_a_file ? ENOTDIR : errno), file, 0, 0,
+                 ErrorKind::missing};
 }
 
 }  // namespace narpa

@@ -22,7 +22,7 @@ struct Frame {
     bool over_time;         ///< each ray has its own time; else all are at mid-exposure
     const FrameSettings& settings;
     const CameraModel* model;  ///< of the camera, never null
-    const Lens* lens;  ///< null: pinhole, all in focus
+    const Lens* lens;          ///< null: pinhole, all in focus
     const std::optional<SunDisc>& sun;
     const Integrator& integrator;
     LightParts parts;  ///< the integrator's

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <sstream>
 
-#include "renderer/keys/based_on.h"
+#include "base/write_file.h"
+#include "renderer/keys/toml_file.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -27,18 +27,11 @@ std::uint64_t fnv1a(std::string_view text, std::uint64_t hash = 0xcbf29ce4842223
 
 Result<ScenarioTexts> scenario_texts(const Scenario& scenario) {
     ScenarioTexts texts;
-    const auto read = [](const std::string& file, const char* what, std::string& out) -> Status {
-        try {
-            auto table = parse_based_on(file, what);
-            if (!table) return table.error();
-            std::ostringstream text;
-            text << toml::toml_formatter(*table) << '\n';
-            out = text.str();
-            return Ok{};
-        } catch (const toml::parse_error& e) {
-            return Error{std::string(e.description()), file, static_cast<int>(e.source().begin.line),
-                         static_cast<int>(e.source().begin.column)};
-        }
+    const auto read = [](const std::string& path, const char* head, std::string& out) -> Status {
+        const auto file = TomlFile::read(path, head);
+        if (!file) return file.error();
+        out = file->text() + '\n';
+        return Ok{};
     };
     if (Status good = read(scenario.file, "scenario", texts.scenario); !good) return good.error();
     if (Status good = read(scenario.scene, "scene", texts.scene); !good) return good.error();

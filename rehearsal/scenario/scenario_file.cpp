@@ -7,7 +7,7 @@
 
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario_tables.h"
-#include "renderer/keys/based_on.h"
+#include "renderer/keys/toml_file.h"
 #include "renderer/keys/toml_reader.h"
 #include "renderer/scene_file/scene_file.h"
 #include "renderer/scene_file/scene_parts.h"
@@ -235,7 +235,7 @@ bool same_names(const std::vector<Named>& a, const std::vector<Named>& b) {
 std::string read_map(TableReader& table, const Scene& scene) {
     const auto map = table.text("map");
     if (!map) return "";
-    std::string path = beside(*table.place("map").path, *map);
+    std::string path = beside(table.place("map").file, *map);
     const auto known = read_scene(path);
     if (!known) {
         table.fail("map", known.error().text());
@@ -377,10 +377,10 @@ std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problem
         s.seed = static_cast<std::uint64_t>(*seed);
     table->require("scene", "the scene file");
     const auto scene = table->text("scene");
-    const toml::source_region place = scene ? table->place("scene") : toml::source_region{};
+    const Place place = table->place("scene");
     table->finish();
     if (!scene) return std::nullopt;
-    s.scene = beside(*place.path, *scene);
+    s.scene = beside(place.file, *scene);
     if (std::error_code error; !std::filesystem::exists(s.scene, error)) {
         problems.add(place, "scene: " + s.scene + ": no such file");
         return std::nullopt;
@@ -416,14 +416,10 @@ Result<Scenario> read_scenario(const std::string& path) {
     Scenario s;
     s.file = path;
     Problems problems(path);
-    try {
-        const auto table = parse_based_on(path, "scenario");
-        if (!table) return table.error();
-        TableReader root(*table, "the scenario", problems);
-        read_root(root, s, problems);
-    } catch (const toml::parse_error& e) {
-        problems.add(e.source(), std::string(e.description()));
-    }
+    const auto file = TomlFile::read(path, "scenario");
+    if (!file) return file.error();
+    TableReader root = file->root("the scenario", problems);
+    read_root(root, s, problems);
     if (!problems.none()) return problems.first();
     return s;
 }

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "renderer/scene/mounting.h"
+
 namespace narpa {
 namespace {
 

@@ -1,9 +1,13 @@
 #include "renderer/keys/toml_reader.h"
 
 #include <fmt/format.h>
+#include <toml++/toml.h>
 
 #include <algorithm>
+#include <cassert>
+#include <chrono>
 #include <cmath>
+#include <tuple>
 
 #include "renderer/keys/other_names.h"
 
@@ -39,32 +43,60 @@ std::string shown(const toml::node& node) {
     return std::string(type_words(node));
 }
 
+Place place_of(const toml::source_region& at) {
+    return {at.path ? *at.path : std::string(), static_cast<int>(at.begin.line), static_cast<int>(at.begin.column)};
+}
+
+/// A date and time, a date, or an ISO 8601 text with either, by the rules of TOML's own dates.
+std::optional<toml::date_time> date_of(const toml::node& node) {
+    if (const auto* t = node.as_date_time()) return t->get();
+    if (const auto* d = node.as_date()) return toml::date_time(d->get(), toml::time{});
+    const auto* s = node.as_string();
+    if (!s || s->get().size() > 40 || s->get().find_first_not_of("0123456789-+:.TtZz ") != std::string::npos)
+        return std::nullopt;
+    try {
+        const toml::table table = toml::parse(std::string_view("t = " + s->get()), std::string_view());
+        const toml::node* const t = table.get("t");
+        return t->is_string() ? std::nullopt : date_of(*t);
+    } catch (const toml::parse_error&) {
+        return std::nullopt;
+    }
+}
+
+std::int64_t unix_ns_from(const toml::date_time& t) {
+    using namespace std::chrono;
+    const sys_days day = year(t.date.year) / month(t.date.month) / std::chrono::day(t.date.day);
+    const std::int64_t seconds = duration_cast<std::chrono::seconds>(day.time_since_epoch()).count() +
+                                 3600 * t.time.hour + 60 * t.time.minute + t.time.second -
+                                 (t.offset ? 60 * t.offset->minutes : 0);
+    return seconds * 1'000'000'000 + t.time.nanosecond;
+}
+
 }  // namespace
 
-Error Problems::located(const toml::source_region& at, std::string what) const {
-    return {.what = std::move(what),
-            .file = at.path ? *at.path : file_,
-            .line = static_cast<int>(at.begin.line),
-            .column = static_cast<int>(at.begin.column)};
+void Problems::add(const Place& at, std::string what) {
+    add(at, Error{std::move(what), at.file.empty() ? file_ : at.file, at.line, at.column});
 }
 
-void Problems::add(const toml::source_region& at, std::string what) {
-    add(at, located(at, std::move(what)));
+void Problems::add(const Place& at, Error error) {
+    problems_.push_back({false, at.line, at.column, std::move(error)});
 }
 
-void Problems::add(const toml::source_region& at, Error error) {
-    problems_.push_back({false, at.begin, std::move(error)});
-}
-
-void Problems::add_missing(const toml::source_region& at, std::string what) {
-    problems_.push_back({true, at.begin, located(at, std::move(what))});
+void Problems::add_missing(const Place& at, std::string what) {
+    add(at, std::move(what));
+    problems_.back().is_missing_key = true;
 }
 
 Error Problems::first() const {
-    const auto earlier = [](const Problem& a, const Problem& b) {
-        return a.is_missing_key != b.is_missing_key ? b.is_missing_key : a.at < b.at;
-    };
-    return std::min_element(problems_.begin(), problems_.end(), earlier)->error;
+    const auto order = [](const Problem& p) { return std::tuple(p.is_missing_key, p.line, p.column); };
+    return std::ranges::min_element(problems_, {}, order)->error;
+}
+
+TableReader::TableReader(const toml::table& table, std::string name, Problems& problems, const Keys* keys)
+    : table_(&table), name_(std::move(name)), problems_(&problems), keys_(keys) {
+    if (keys_)
+        for (const Key* key : keys_->all_rows())
+            if (!key->required.empty()) require(key->name, key->required);
 }
 
 const toml::node* TableReader::find(std::string_view key) {
@@ -72,9 +104,21 @@ const toml::node* TableReader::find(std::string_view key) {
     return table_->get(key);
 }
 
-const toml::source_region& TableReader::place(std::string_view key) const {
+const Value& TableReader::row(std::string_view key, [[maybe_unused]] Value::Type type) const {
+    static constexpr Value kNone{};
+    const Key* const found = keys_ ? keys_->find(key, kind_) : nullptr;
+    if (!found) {
+        assert(!keys_ && "a key that is read has a row");
+        return kNone;
+    }
+    using enum Value::Type;
+    assert(found->value.type == type || (type == text && (found->value.or_file || found->value.type == choice)));
+    return found->value;
+}
+
+Place TableReader::place(std::string_view key) const {
     const toml::node* node = table_->get(key);
-    return node ? node->source() : table_->source();
+    return place_of(node ? node->source() : table_->source());
 }
 
 void TableReader::fail(std::string_view key, const std::string& what) {
@@ -83,8 +127,44 @@ void TableReader::fail(std::string_view key, const std::string& what) {
 
 void TableReader::require(std::string_view key, std::string_view expected) {
     if (!has(key))
-        problems_->add_missing(table_->source(),
+        problems_->add_missing(place_of(table_->source()),
                                fmt::format("{} has no \"{}\", expected {}", name_, key, expected));
+}
+
+std::optional<std::size_t> TableReader::kind() {
+    assert(keys_ && keys_->kinds);
+    const std::vector<Kind> kinds = keys_->kinds();
+    const auto rows = keys_->all_rows();
+    const auto at = std::ranges::find(rows, Value::Type::kind, [](const Key* k) { return k->value.type; });
+    assert(at != rows.end());
+    const Key& key = **at;
+    const auto index = [&](std::string_view name) {
+        return static_cast<std::size_t>(std::ranges::find(kinds, name, &Kind::name) - kinds.begin());
+    };
+    if (!has(key.name)) {
+        if (key.value.otherwise.empty()) return std::nullopt;
+        kind_ = static_cast<int>(index(key.value.otherwise));
+    } else {
+        std::vector<std::string_view> names;
+        for (const Kind& k : kinds) names.push_back(k.name);
+        const auto given = word(key.name, names);
+        if (!given) return std::nullopt;
+        kind_ = static_cast<int>(*given);
+    }
+    const Kind& own = kinds[static_cast<std::size_t>(kind_)];
+    for (const auto& [node_key, value] : *table_) {
+        if (keys_->find(node_key.str(), kind_)) continue;
+        std::string owners;
+        for (const Kind& k : kinds)
+            if (std::ranges::find(k.rows, node_key.str(), &Key::name) != k.rows.end())
+                owners += fmt::format("{}\"{}\"", owners.empty() ? "" : " or ", k.name);
+        if (!owners.empty())
+            refuse(node_key.str(),
+                   fmt::format("belongs to {} = {}, and this is \"{}\"", key.name, owners, own.name));
+    }
+    for (const Key& k : own.rows)
+        if (!k.required.empty()) require(k.name, k.required);
+    return kind_;
 }
 
 template <class Take>
@@ -97,12 +177,21 @@ auto TableReader::value(std::string_view key, const Take& take, const std::strin
     return taken;
 }
 
+std::optional<double> TableReader::number(std::string_view key) {
+    return number(key, row(key, Value::Type::number).range);
+}
+
 std::optional<double> TableReader::number(std::string_view key, const Range& range) {
     const auto take = [&](const toml::node& node) {
         const std::optional<double> x = as_number(node);
         return x && range.holds(*x) ? x : std::nullopt;
     };
     return value(key, take, range.words());
+}
+
+std::optional<std::int64_t> TableReader::integer(std::string_view key) {
+    const Value& own = row(key, Value::Type::integer);
+    return integer(key, own.low, own.high);
 }
 
 std::optional<std::int64_t> TableReader::integer(std::string_view key, std::int64_t low, std::int64_t high) {
@@ -114,16 +203,19 @@ std::optional<std::int64_t> TableReader::integer(std::string_view key, std::int6
 }
 
 std::optional<bool> TableReader::boolean(std::string_view key) {
+    (void)row(key, Value::Type::boolean);
     return value(
         key, [](const toml::node& node) { return node.value_exact<bool>(); }, "true or false");
 }
 
 std::optional<std::string> TableReader::text(std::string_view key) {
+    (void)row(key, Value::Type::text);
     return value(
         key, [](const toml::node& node) { return node.value_exact<std::string>(); }, "a text in quotes");
 }
 
 std::optional<std::vector<std::string>> TableReader::texts(std::string_view key) {
+    (void)row(key, Value::Type::texts);
     const auto take = [](const toml::node& node) -> std::optional<std::vector<std::string>> {
         const toml::array* array = node.as_array();
         if (!array || !(array->empty() || array->is_homogeneous(toml::node_type::string))) return std::nullopt;
@@ -134,28 +226,45 @@ std::optional<std::vector<std::string>> TableReader::texts(std::string_view key)
     return value(key, take, "an array of texts in quotes");
 }
 
-std::optional<std::vector<double>> TableReader::numbers(std::string_view key,
-                                                        std::initializer_list<std::size_t> counts,
-                                                        const Range& range) {
+std::optional<std::vector<double>> TableReader::numbers(std::string_view key, const Value& expected) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     const toml::array* array = node->as_array();
-    if (!array || std::ranges::find(counts, array->size()) == counts.end()) {
+    if (!array || !expected.allows(array->size())) {
         const std::string got = array ? fmt::format("an array of {}", array->size()) : shown(*node);
-        fail(key, fmt::format("got {}, expected an array of {} numbers", got, fmt::join(counts, ", ")));
+        const auto end = std::ranges::find(expected.counts, 0);
+        const std::string counts = end == expected.counts.begin()
+                                       ? fmt::format("{} to {}", expected.count_min, expected.count_max)
+                                       : fmt::format("{}", fmt::join(expected.counts.begin(), end, ", "));
+        fail(key, fmt::format("got {}, expected an array of {} numbers", got, counts));
         return std::nullopt;
     }
     std::vector<double> out;
     for (const toml::node& element : *array) {
         const std::optional<double> x = as_number(element);
-        if (!x || !range.holds(*x)) {
-            problems_->add(element.source(), fmt::format("{}[{}]: got {}, expected {}", key, out.size(),
-                                                         shown(element), range.words()));
+        if (!x || !expected.range.holds(*x)) {
+            problems_->add(place_of(element.source()), fmt::format("{}[{}]: got {}, expected {}", key, out.size(),
+                                                                   shown(element), expected.range.words()));
             return std::nullopt;
         }
         out.push_back(*x);
     }
     return out;
+}
+
+std::optional<std::vector<double>> TableReader::numbers(std::string_view key) {
+    return numbers(key, row(key, Value::Type::numbers));
+}
+
+std::optional<std::vector<double>> TableReader::numbers(std::string_view key, std::initializer_list<int> counts,
+                                                        const Range& range) {
+    Value expected{.type = Value::Type::numbers, .range = range};
+    std::ranges::copy(counts, expected.counts.begin());
+    return numbers(key, expected);
+}
+
+std::optional<Vec3> TableReader::vec3(std::string_view key) {
+    return vec3(key, row(key, Value::Type::numbers).range);
 }
 
 std::optional<Vec3> TableReader::vec3(std::string_view key, const Range& range) {
@@ -172,16 +281,24 @@ Vec3 scaled_to_one(const Vec3& a) {
 }
 
 std::optional<Vec3> TableReader::direction(std::string_view key) {
-    const auto v = vec3(key);
+    const auto v = vec3(key, row(key, Value::Type::direction).range);
     if (!v) return std::nullopt;
     if (*v == Vec3{}) return fail(key, "expected a direction, of any length but 0"), std::nullopt;
     return normalized(scaled_to_one(*v));
+}
+
+std::optional<std::array<double, 2>> TableReader::pair(std::string_view key) {
+    return pair(key, row(key, Value::Type::numbers).range);
 }
 
 std::optional<std::array<double, 2>> TableReader::pair(std::string_view key, const Range& range) {
     const auto v = numbers(key, {2}, range);
     if (!v) return std::nullopt;
     return std::array{(*v)[0], (*v)[1]};
+}
+
+std::optional<Rgb> TableReader::rgb(std::string_view key) {
+    return rgb(key, row(key, Value::Type::rgb).range);
 }
 
 std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
@@ -198,6 +315,7 @@ std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
 }
 
 std::optional<Quat> TableReader::attitude(std::string_view key) {
+    (void)row(key, Value::Type::attitude);
     const auto v = numbers(key, {4});
     if (!v) return std::nullopt;
     const Quat q{(*v)[0], (*v)[1], (*v)[2], (*v)[3]};
@@ -207,6 +325,10 @@ std::optional<Quat> TableReader::attitude(std::string_view key) {
         return std::nullopt;
     }
     return normalized(q);
+}
+
+std::optional<std::array<int, 2>> TableReader::size(std::string_view key) {
+    return size(key, static_cast<int>(row(key, Value::Type::size).high));
 }
 
 std::optional<std::array<int, 2>> TableReader::size(std::string_view key, int high) {
@@ -223,11 +345,72 @@ std::optional<std::array<int, 2>> TableReader::size(std::string_view key, int hi
     return std::nullopt;
 }
 
+std::optional<std::vector<Vec3>> TableReader::points(std::string_view key) {
+    return points(key, row(key, Value::Type::points).count_max);
+}
+
+std::optional<std::vector<Vec3>> TableReader::points(std::string_view key, int count_max) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    std::vector<Vec3> all;
+    const toml::array* points = node->as_array();
+    bool good = points && !points->empty() && points->size() <= static_cast<std::size_t>(count_max);
+    for (std::size_t i = 0; good && i < points->size(); ++i) {
+        const toml::array* p = points->get(i)->as_array();
+        good = p && p->size() == 3;
+        Vec3 point;
+        for (std::size_t k = 0; good && k < 3; ++k)
+            point[static_cast<int>(k)] = as_number(*p->get(k)).value_or(std::numeric_limits<double>::quiet_NaN());
+        good = good && norm(point) < 1e15;
+        all.push_back(point);
+    }
+    if (good) return all;
+    fail(key, fmt::format("expected [[x, y, z], ...], 1 to {} points in metres in the body's frame", count_max));
+    return std::nullopt;
+}
+
+std::optional<std::int64_t> TableReader::date(std::string_view key) {
+    constexpr int kFirstYear = 1900, kLastYear = 2099;  // of ERFA's Earth ephemeris and of int64 nanoseconds
+    (void)row(key, Value::Type::date);
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const std::optional<toml::date_time> t = date_of(*node);
+    if (t && t->date.year >= kFirstYear && t->date.year <= kLastYear) return unix_ns_from(*t);
+    fail(key, fmt::format("expected a UTC date and time of the years {} to {}, as 2026-03-01T12:00:00Z", kFirstYear,
+                          kLastYear));
+    return std::nullopt;
+}
+
+std::optional<std::size_t> TableReader::word(std::string_view key) {
+    return word(key, row(key, Value::Type::choice).words());
+}
+
+std::optional<std::size_t> TableReader::word(std::string_view key, const std::vector<std::string_view>& words) {
+    const auto take = [](const toml::node& node) { return node.value_exact<std::string>(); };
+    const std::optional<std::string> given = value(key, take, "a text in quotes");
+    if (!given) return std::nullopt;
+    if (const auto at = std::ranges::find(words, *given); at != words.end())
+        return static_cast<std::size_t>(at - words.begin());
+    fail(key, fmt::format("\"{}\" is not known here, expected one of \"{}\"", *given, fmt::join(words, "\", \"")));
+    return std::nullopt;
+}
+
+bool TableReader::is_text(std::string_view key) {
+    const toml::node* node = find(key);
+    return node && node->is_string();
+}
+
+bool TableReader::is_table(std::string_view key) {
+    const toml::node* node = find(key);
+    return node && node->is_table();
+}
+
 std::optional<TableReader> TableReader::table(std::string_view key) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     if (const toml::table* t = node->as_table())
-        return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_);
+        return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_,
+                           row(key, Value::Type::table).keys);
     fail(key, fmt::format("got {}, expected a table", shown(*node)));
     return std::nullopt;
 }
@@ -241,8 +424,9 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
         return {};
     }
     std::vector<TableReader> out;
+    const Keys* const keys = row(key, Value::Type::tables).keys;
     for (const toml::node& element : *array)
-        out.emplace_back(*element.as_table(), fmt::format("[[{}]]", key), *problems_);
+        out.emplace_back(*element.as_table(), fmt::format("[[{}]]", key), *problems_, keys);
     return out;
 }
 
@@ -271,10 +455,18 @@ void TableReader::refuse_keys_of_other_kinds(std::string_view kind, std::span<co
 }
 
 void TableReader::finish() {
+    std::vector<std::string> known = asked_;
+    if (keys_) {
+        for (const Key* key : keys_->all_rows()) known.emplace_back(key->name);
+        const std::vector<Kind> kinds = keys_->kinds ? keys_->kinds() : std::vector<Kind>{};
+        for (std::size_t k = 0; k < kinds.size(); ++k)
+            if (kind_ < 0 || kind_ == static_cast<int>(k))
+                for (const Key& key : kinds[k].rows) known.emplace_back(key.name);
+    }
     for (const auto& [key, value] : *table_)
-        if (std::find(asked_.begin(), asked_.end(), key.str()) == asked_.end())
-            problems_->add(key.source(), fmt::format("unknown key \"{}\" in {}{}", key.str(), name_,
-                                                     key_meant(key.str(), asked_)));
+        if (std::ranges::find(known, key.str()) == known.end())
+            problems_->add(place_of(key.source()), fmt::format("unknown key \"{}\" in {}{}", key.str(), name_,
+                                                               key_meant(key.str(), known)));
 }
 
 }  // namespace narpa

@@ -5,11 +5,9 @@
 /// the end.
 #pragma once
 
-#include <toml++/toml.h>
-
 #include <array>
+#include <concepts>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,17 +19,30 @@
 #include "base/result.h"
 #include "renderer/keys/keys.h"
 
+namespace toml {
+inline namespace v3 {
+class node;
+class table;
+}  // namespace v3
+}  // namespace toml
+
 namespace narpa {
+
+/// Where a key or value stands in a file.
+struct Place {
+    std::string file{};
+    int line = 0, column = 0;
+};
 
 /// Everything that is wrong with a file so far.
 class Problems {
 public:
     explicit Problems(std::string file) : file_(std::move(file)) {}
-    void add(const toml::source_region& at, std::string what);
+    void add(const Place& at, std::string what);
     /// A missing key. Reported when nothing else is wrong: it may be present under a misspelt name.
-    void add_missing(const toml::source_region& at, std::string what);
+    void add_missing(const Place& at, std::string what);
     /// An error of another file (a mesh, a texture) that was named at this place.
-    void add(const toml::source_region& at, Error error);
+    void add(const Place& at, Error error);
     [[nodiscard]] bool none() const { return problems_.empty(); }
     /// The first in the file; missing keys come last.
     [[nodiscard]] Error first() const;
@@ -40,10 +51,9 @@ public:
 private:
     struct Problem {
         bool is_missing_key;
-        toml::source_position at;
+        int line, column;
         Error error;
     };
-    [[nodiscard]] Error located(const toml::source_region& at, std::string what) const;
 
     std::string file_;
     std::vector<Problem> problems_;
@@ -59,67 +69,110 @@ struct KindKeys {
     std::vector<std::string_view> keys;
 };
 
-/// One table of the file.
+/// One table of the file. Ranges, choices and counts are those of the keys' rows, unless a call narrows them.
 class TableReader {
 public:
-    /// `name` as the file has it: "[sun]", "[[camera]]", "sphere".
-    TableReader(const toml::table& table, std::string name, Problems& problems)
-        : table_(&table), name_(std::move(name)), problems_(&problems) {}
+    /// `name` as the file has it: "[sun]", "[[camera]]", "sphere". Notes a problem for each required key that is
+    /// absent. The table outlives the reader.
+    TableReader(const toml::table& table, std::string name, Problems& problems, const Keys* keys = nullptr);
 
     [[nodiscard]] const std::string& name() const { return name_; }
     [[nodiscard]] bool has(std::string_view key) { return find(key) != nullptr; }
     /// Notes a problem when the key is absent; `expected` completes "expected ...".
     void require(std::string_view key, std::string_view expected);
 
-    std::optional<double> number(std::string_view key, const Range& range = kAnyNumber);
+    /// The index of the table's kind in `Keys::kinds`. Refuses keys that only other kinds have.
+    std::optional<std::size_t> kind();
+
+    std::optional<double> number(std::string_view key);
+    std::optional<double> number(std::string_view key, const Range& range);
+    std::optional<std::int64_t> integer(std::string_view key);
     std::optional<std::int64_t> integer(std::string_view key, std::int64_t low, std::int64_t high);
     std::optional<bool> boolean(std::string_view key);
     std::optional<std::string> text(std::string_view key);
     /// An array of texts.
     std::optional<std::vector<std::string>> texts(std::string_view key);
     /// An array of one of these counts.
-    std::optional<std::vector<double>> numbers(std::string_view key, std::initializer_list<std::size_t> counts,
+    std::optional<std::vector<double>> numbers(std::string_view key);
+    std::optional<std::vector<double>> numbers(std::string_view key, std::initializer_list<int> counts,
                                                const Range& range = kAnyNumber);
-    std::optional<Vec3> vec3(std::string_view key, const Range& range = kAnyNumber);
+    std::optional<Vec3> vec3(std::string_view key);
+    std::optional<Vec3> vec3(std::string_view key, const Range& range);
     /// A unit vector from one of any length but 0.
     std::optional<Vec3> direction(std::string_view key);
-    std::optional<std::array<double, 2>> pair(std::string_view key, const Range& range = kAnyNumber);
+    std::optional<std::array<double, 2>> pair(std::string_view key);
+    std::optional<std::array<double, 2>> pair(std::string_view key, const Range& range);
     /// One number for the three bands, or [r, g, b].
+    std::optional<Rgb> rgb(std::string_view key);
     std::optional<Rgb> rgb(std::string_view key, const Range& range);
     /// [w, x, y, z]; made exactly unit when | |q| - 1 | < 1e-3, else a problem.
     std::optional<Quat> attitude(std::string_view key);
     /// [width, height], each in [1, high].
+    std::optional<std::array<int, 2>> size(std::string_view key);
     std::optional<std::array<int, 2>> size(std::string_view key, int high);
+    /// [[x, y, z], ...]
+    std::optional<std::vector<Vec3>> points(std::string_view key);
+    std::optional<std::vector<Vec3>> points(std::string_view key, int count_max);
+    /// UTC in ns since 1970, of the years 1900 to 2099; a time without an offset is UTC.
+    std::optional<std::int64_t> date(std::string_view key);
+    /// Sets `value` if the key is there and good.
+    template <class T>
+    void read(std::string_view key, T& value) {
+        if constexpr (std::same_as<T, bool>) {
+            value = boolean(key).value_or(value);
+        } else if constexpr (std::floating_point<T>) {
+            if (const auto x = number(key)) value = static_cast<T>(*x);
+        } else if constexpr (std::integral<T>) {
+            if (const auto i = integer(key)) value = static_cast<T>(*i);
+        } else if constexpr (std::same_as<T, Vec3>) {
+            value = vec3(key).value_or(value);
+        } else if constexpr (std::same_as<T, Rgb>) {
+            value = rgb(key).value_or(value);
+        } else if constexpr (std::same_as<T, Quat>) {
+            value = attitude(key).value_or(value);
+        } else {
+            static_assert(std::same_as<T, std::string>);
+            value = text(key).value_or(std::move(value));
+        }
+    }
     /// One of a few words.
     template <class T>
     std::optional<T> choice(std::string_view key, std::span<const std::pair<std::string_view, T>> words) {
-        const std::optional<std::string> word = text(key);
-        if (!word) return std::nullopt;
-        std::string all;
-        for (const auto& [name, value] : words) {
-            if (name == *word) return value;
-            all += (all.empty() ? "\"" : ", \"") + std::string(name) + "\"";
-        }
-        fail(key, "\"" + *word + "\" is not known here, expected one of " + all);
-        return std::nullopt;
+        std::vector<std::string_view> names;
+        for (const auto& [name, value] : words) names.push_back(name);
+        const auto index = word(key, names);
+        return index ? std::optional<T>(words[*index].second) : std::nullopt;
     }
+    template <class T, std::size_t N>
+    std::optional<T> choice(std::string_view key, const std::array<std::pair<std::string_view, T>, N>& words) {
+        return choice<T>(key, std::span<const std::pair<std::string_view, T>>(words));
+    }
+    /// The index of a choice among the words of its row.
+    std::optional<std::size_t> word(std::string_view key);
     std::optional<TableReader> table(std::string_view key);
     /// The tables of `[[key]]`, in the file's order.
     std::vector<TableReader> tables(std::string_view key);
 
-    /// The node of a key, counted as read; null when absent.
-    const toml::node* find(std::string_view key);
+    /// Whether the key is there and holds a text.
+    [[nodiscard]] bool is_text(std::string_view key);
+    [[nodiscard]] bool is_table(std::string_view key);
     /// A known key that is not allowed here; `why` completes "KEY: ...". No effect where it is absent.
     void refuse(std::string_view key, const std::string& why);
     /// Refuses the keys that belong to other kinds only: each kind of table has its own.
     void refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds);
     /// Notes a problem at the value of a key (at the table when absent).
     void fail(std::string_view key, const std::string& what);
-    [[nodiscard]] const toml::source_region& place(std::string_view key) const;
-    /// Every key that was not read is a problem. Call it last.
+    [[nodiscard]] Place place(std::string_view key) const;
+    /// Every unknown key is a problem. Call it last.
     void finish();
 
 private:
+    /// The node of a key, counted as read; null when absent.
+    const toml::node* find(std::string_view key);
+    /// What the key's row says. It has a row of this type.
+    [[nodiscard]] const Value& row(std::string_view key, Value::Type type) const;
+    std::optional<std::vector<double>> numbers(std::string_view key, const Value& expected);
+    std::optional<std::size_t> word(std::string_view key, const std::vector<std::string_view>& words);
     /// The result of `take` for the key's node; notes a problem if it is empty.
     template <class Take>
     auto value(std::string_view key, const Take& take, const std::string& expected)
@@ -128,6 +181,8 @@ private:
     const toml::table* table_;
     std::string name_;
     Problems* problems_;
+    const Keys* keys_;  ///< null: of a table without rows
+    int kind_ = -1;     ///< index in Keys::kinds; -1: not known
     std::vector<std::string> asked_;
 };
 

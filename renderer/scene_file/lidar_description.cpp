@@ -11,8 +11,7 @@
 #include "base/csv.h"
 #include "base/read_number.h"
 #include "protocols/lidar/pattern_lidar.h"
-#include "renderer/keys/based_on.h"
-#include "renderer/keys/toml_reader.h"
+#include "renderer/keys/toml_file.h"
 
 namespace narpa {
 namespace {
@@ -20,23 +19,71 @@ namespace {
 constexpr Range kAzimuth_deg{.low = -720, .high = 720}, kElevation_deg{.low = -90, .high = 90},
     kPhase{.low = 0, .high = 1, .high_open = true};
 
+constexpr Range kRate{.low = 0, .high = 1e4, .low_open = true}, kShare{.low = 0, .high = 1, .low_open = true};
+constexpr int kMaxBeams = 256;
+
+/// Whether cells have equal steps of the tangent or of the angle across the field of view.
+enum class Spacing : std::uint8_t { tangents, angles };
+enum class Scan : std::uint8_t { flash, rows, columns };
+constexpr std::array<std::pair<std::string_view, Spacing>, 2> kSpacings{
+    {{"tangents", Spacing::tangents}, {"angles", Spacing::angles}}};
+constexpr std::array<std::pair<std::string_view, Scan>, 3> kScans{
+    {{"flash", Scan::flash}, {"rows", Scan::rows}, {"columns", Scan::columns}}};
+
+constexpr Key kHeadRows[]{
+    {"based_on", rows::file()},
+    {"name", rows::text(), "a text"},
+    {"rate_hz", rows::number(kRate), "frames a second"},
+    {"range_max_m", rows::number({.low = 0, .high = 1e3 * UINT32_MAX, .low_open = true}), "the rated range"},
+    {"rate_hz_min", rows::number(kRate)},
+    {"rate_hz_max", rows::number(kRate)},
+    {"range_resolution_m", rows::number({.low = 0, .high = 1e3, .low_open = true})},
+    {"velocity_resolution_m_s", rows::number({.low = 0, .high = 1e3})},
+    {"dual", rows::boolean()},
+    {"latency_s", rows::number({.low = 0, .high = LidarPattern::kLongest_s})},
+    {"data_port", rows::integer(1, 65535)},
+    {"shots", rows::file()},
+};
+constexpr Key kGridRows[]{
+    {"columns", rows::integer(1, 65535), "a count"},
+    {"rows", rows::integer(1, 65535), "a count"},
+    {"fov_horizontal_deg", rows::number({.low = 0, .high = 360, .low_open = true}), "an angle"},
+    {"fov_vertical_deg", rows::number({.low = 0, .high = 180, .low_open = true}), "an angle"},
+    {"spacing", rows::choice<kSpacings>()},
+    {"scan", rows::choice<kScans>()},
+    {"two_way", rows::boolean()},
+    {"scan_share", rows::number(kShare)},
+};
+constexpr Key kSpinRows[]{
+    {"columns", rows::integer(1, 65536), "a count: firings in a turn"},
+    {"elevation_deg", rows::numbers_up_to(kMaxBeams, kElevation_deg), "an array of angles, one for each laser"},
+    {"azimuth_deg", rows::numbers_up_to(kMaxBeams, {.low = -180, .high = 180})},
+};
+constexpr Key kBeamRows[]{
+    {"azimuth_deg", rows::number(kAzimuth_deg), "an angle, clockwise from y"},
+    {"elevation_deg", rows::number(kElevation_deg), "an angle above the plane of x and y"},
+    {"phase", rows::number(kPhase)},
+};
+constexpr Keys kHeadKeys{.rows = kHeadRows}, kGridKeys{.rows = kGridRows}, kSpinKeys{.rows = kSpinRows},
+    kBeamKeys{.rows = kBeamRows};
+constexpr Key kDescriptionRows[]{
+    {"lidar", rows::table(kHeadKeys), "a table [lidar]"},
+    {"grid", rows::table(kGridKeys)},
+    {"spin", rows::table(kSpinKeys)},
+    {"beam", rows::tables(kBeamKeys)},
+};
+
 std::vector<PatternShot> read_beams(std::vector<TableReader> tables) {
     std::vector<PatternShot> shots;
     for (TableReader& table : tables) {
-        table.require("azimuth_deg", "an angle, clockwise from y");
-        table.require("elevation_deg", "an angle above the plane of x and y");
-        shots.push_back({.azimuth_rad = kRadPerDeg * table.number("azimuth_deg", kAzimuth_deg).value_or(0),
-                         .elevation_rad = kRadPerDeg * table.number("elevation_deg", kElevation_deg).value_or(0),
-                         .phase = table.number("phase", kPhase).value_or(0),
+        shots.push_back({.azimuth_rad = kRadPerDeg * table.number("azimuth_deg").value_or(0),
+                         .elevation_rad = kRadPerDeg * table.number("elevation_deg").value_or(0),
+                         .phase = table.number("phase").value_or(0),
                          .beam = static_cast<int>(shots.size())});
         table.finish();
     }
     return shots;
 }
-
-/// Whether cells have equal steps of the tangent or of the angle across the field of view.
-enum class Spacing : std::uint8_t { tangents, angles };
-enum class Scan : std::uint8_t { flash, rows, columns };
 
 /// The field's angle at cell i of n, from -1/2 of the field to +1/2.
 double at_cell(Spacing spacing, double field_rad, std::int64_t i, std::int64_t n) {
@@ -76,26 +123,19 @@ std::vector<PatternShot> shots_of(const Grid& g) {
 }
 
 void read_grid(TableReader table, LidarPattern& pattern) {
-    static constexpr std::array<std::pair<std::string_view, Spacing>, 2> kSpacings{
-        {{"tangents", Spacing::tangents}, {"angles", Spacing::angles}}};
-    static constexpr std::array<std::pair<std::string_view, Scan>, 3> kScans{
-        {{"flash", Scan::flash}, {"rows", Scan::rows}, {"columns", Scan::columns}}};
-    constexpr std::int64_t kMaxCells = 65'535;
     Grid g;
-    for (const char* key : {"columns", "rows"}) table.require(key, "a count");
-    for (const char* key : {"fov_horizontal_deg", "fov_vertical_deg"}) table.require(key, "an angle");
-    g.columns = table.integer("columns", 1, kMaxCells).value_or(1);
-    g.rows = table.integer("rows", 1, kMaxCells).value_or(1);
-    g.spacing = table.choice<Spacing>("spacing", kSpacings).value_or(Spacing::tangents);
+    table.read("columns", g.columns);
+    table.read("rows", g.rows);
+    g.spacing = table.choice("spacing", kSpacings).value_or(Spacing::tangents);
     const double most = g.spacing == Spacing::tangents ? 170 : 360;
     const auto fov = [&](const char* key, double limit) {
         return kRadPerDeg * table.number(key, {.low = 0, .high = limit, .low_open = true}).value_or(1);
     };
     g.horizontal_rad = fov("fov_horizontal_deg", most);
     g.vertical_rad = fov("fov_vertical_deg", std::min(most, 180.0));
-    g.scan = table.choice<Scan>("scan", kScans).value_or(Scan::flash);
-    g.two_way = table.boolean("two_way").value_or(false);
-    g.scan_share = table.number("scan_share", {.low = 0, .high = 1, .low_open = true}).value_or(1);
+    g.scan = table.choice("scan", kScans).value_or(Scan::flash);
+    table.read("two_way", g.two_way);
+    table.read("scan_share", g.scan_share);
     if (g.scan == Scan::flash)
         for (const char* key : {"two_way", "scan_share"}) table.refuse(key, "all shots of a flash fire at once");
     table.finish();
@@ -115,25 +155,11 @@ void read_grid(TableReader table, LidarPattern& pattern) {
 }
 
 std::vector<PatternShot> read_spin(TableReader table) {
-    constexpr std::int64_t kMaxColumns = 65'536;
-    constexpr std::size_t kMaxBeams = 256;
-    table.require("columns", "a count: firings in a turn");
-    table.require("elevation_deg", "an array of angles, one for each laser");
-    const std::int64_t columns = table.integer("columns", 1, kMaxColumns).value_or(1);
-    const auto angles = [&](const char* key, std::size_t count, const Range& range) {
-        std::vector<double> all;
-        const toml::node* node = table.find(key);
-        const toml::array* array = node ? node->as_array() : nullptr;
-        if (node &&
-            (!array || array->empty() || array->size() > kMaxBeams || (count > 0 && array->size() != count)))
-            table.fail(key, count > 0 ? fmt::format("expected an array of {} numbers", count)
-                                      : fmt::format("expected an array of 1 to {} numbers", kMaxBeams));
-        else if (array)
-            all = table.numbers(key, {array->size()}, range).value_or(std::vector<double>(array->size()));
-        return all;
-    };
-    const std::vector<double> elevation_deg = angles("elevation_deg", 0, kElevation_deg);
-    std::vector<double> azimuth_deg = angles("azimuth_deg", elevation_deg.size(), {.low = -180, .high = 180});
+    const std::int64_t columns = table.integer("columns").value_or(1);
+    const auto elevation_deg = table.numbers("elevation_deg").value_or(std::vector<double>{});
+    auto azimuth_deg = table.numbers("azimuth_deg").value_or(std::vector<double>{});
+    if (table.has("azimuth_deg") && !elevation_deg.empty() && azimuth_deg.size() != elevation_deg.size())
+        table.fail("azimuth_deg", fmt::format("expected an array of {} numbers", elevation_deg.size()));
     azimuth_deg.resize(elevation_deg.size());
     table.finish();
     const auto shots = static_cast<std::size_t>(columns) * elevation_deg.size();
@@ -198,45 +224,34 @@ void read_pattern(TableReader& root, TableReader& head, const std::string& file,
 }
 
 void read_head(TableReader& head, LidarPattern& p) {
-    constexpr Range kRate{.low = 0, .high = 1e4, .low_open = true};
-    head.text("based_on");
-    head.require("name", "a text");
-    head.require("rate_hz", "frames a second");
-    head.require("range_max_m", "the rated range");
-    p.name = head.text("name").value_or("");
+    head.read("name", p.name);
     if (head.has("name") && (p.name.empty() || p.name.size() > 64))
         head.fail("name", "expected 1 to 64 characters");
-    p.rate_hz_default = head.number("rate_hz", kRate).value_or(10);
-    p.rate_hz_min = head.number("rate_hz_min", kRate).value_or(p.rate_hz_default);
-    p.rate_hz_max = head.number("rate_hz_max", kRate).value_or(p.rate_hz_default);
-    p.range_resolution_m =
-        head.number("range_resolution_m", {.low = 0, .high = 1e3, .low_open = true}).value_or(1e-3);
+    p.rate_hz_default = head.number("rate_hz").value_or(10);
+    p.rate_hz_min = head.number("rate_hz_min").value_or(p.rate_hz_default);
+    p.rate_hz_max = head.number("rate_hz_max").value_or(p.rate_hz_default);
+    p.range_resolution_m = head.number("range_resolution_m").value_or(1e-3);
     p.range_m_default =
         head.number("range_max_m", {.low = 0, .high = p.range_resolution_m * UINT32_MAX, .low_open = true})
             .value_or(1);
-    p.velocity_resolution_m_s = head.number("velocity_resolution_m_s", {.low = 0, .high = 1e3}).value_or(0);
+    p.velocity_resolution_m_s = head.number("velocity_resolution_m_s").value_or(0);
     p.dual = head.boolean("dual").value_or(false);
-    p.latency_s = head.number("latency_s", {.low = 0, .high = LidarPattern::kLongest_s}).value_or(0);
-    p.data_port = static_cast<std::uint16_t>(head.integer("data_port", 1, 65535).value_or(p.data_port));
+    p.latency_s = head.number("latency_s").value_or(0);
+    head.read("data_port", p.data_port);
 }
 
 Result<LidarMake> read_description(const std::string& file) {
     Problems problems(file);
     auto pattern = std::make_shared<LidarPattern>();
-    try {
-        const auto table = parse_based_on(file, "lidar");
-        if (!table) return table.error();
-        TableReader root(*table, "the description", problems);
-        root.require("lidar", "a table [lidar]");
-        if (auto head = root.table("lidar")) {
-            read_head(*head, *pattern);
-            read_pattern(root, *head, file, *pattern);
-            head->finish();
-        }
-        root.finish();
-    } catch (const toml::parse_error& e) {
-        problems.add(e.source(), std::string(e.description()));
+    const auto parsed = TomlFile::read(file, "lidar");
+    if (!parsed) return parsed.error();
+    TableReader root = parsed->root("the description", problems, &kLidarDescriptionKeys);
+    if (auto head = root.table("lidar")) {
+        read_head(*head, *pattern);
+        read_pattern(root, *head, file, *pattern);
+        head->finish();
     }
+    root.finish();
     if (!problems.none()) return problems.first();
     auto make = make_of(pattern);
     if (!make) return Error{make.error().what, file};
@@ -244,6 +259,8 @@ Result<LidarMake> read_description(const std::string& file) {
 }
 
 }  // namespace
+
+const Keys kLidarDescriptionKeys{.rows = kDescriptionRows};
 
 Result<LidarMake> read_lidar_description(const std::string& file) {
     try {

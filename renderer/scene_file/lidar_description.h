@@ -5,8 +5,11 @@
 
 #include "base/result.h"
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/keys/keys.h"
 
 namespace narpa {
+
+extern const Keys kLidarDescriptionKeys;
 
 /// Errors name the file and the line, and what was expected.
 [[nodiscard]] Result<LidarMake> read_lidar_description(const std::string& file);

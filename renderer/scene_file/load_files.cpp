@@ -59,7 +59,7 @@ private:
     void blame(const NamedMesh& named, Error error) {
         if (error.line == 0) return r_.problems.add(named.place, "mesh: " + error.text());
         error.what += fmt::format(" (mesh of body \"{}\", {}:{})", r_.scene.bodies[named.body].name,
-                                  r_.problems.file(), named.place.begin.line);
+                                  r_.problems.file(), named.place.line);
         r_.problems.add(named.place, std::move(error));
     }
 
@@ -200,7 +200,7 @@ void load_named_files(SceneReading& reading) {
     if (!reading.problems.none()) return;
     for (const NamedTexture& texture : reading.textures) check_coordinates(texture, reading);
     if (reading.scene.materials.size() > std::numeric_limits<std::uint16_t>::max())
-        reading.problems.add(toml::source_region{}, "more than 65535 materials");
+        reading.problems.add(Place{}, "more than 65535 materials");
 }
 
 }  // namespace narpa

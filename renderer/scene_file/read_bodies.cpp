@@ -130,7 +130,6 @@ void read_bodies(TableReader& root, SceneReading& reading) {
         table.finish();
         reading.scene.bodies.push_back(std::move(body));
     }
-    root.require("body", "at least one [[body]]");
 }
 
 }  // namespace narpa

@@ -15,7 +15,7 @@ namespace {
 
 constexpr Range kDemFactor{.low = -1e9, .high = 1e9};
 constexpr Range kDemLength{.low = 0, .high = 1e9, .low_open = true};
-constexpr std::size_t kMaxPathPoints = 256;
+constexpr int kMaxPathPoints = 256;
 constexpr double kPixelsPerRadWithoutCamera = 1000;
 
 constexpr std::array<std::pair<std::string_view, DemRequest::On>, 3> kGrounds{
@@ -36,26 +36,6 @@ TerrainDetail read_detail(TableReader& table) {
     return d;
 }
 
-std::vector<Vec3> read_seen_from(TableReader& table, std::string_view key) {
-    const toml::node* node = table.find(key);
-    if (!node) return {};
-    std::vector<Vec3> path;
-    const toml::array* points = node->as_array();
-    for (std::size_t i = 0; points && i < points->size(); ++i) {
-        const toml::array* p = points->get(i)->as_array();
-        Vec3 point{NAN, NAN, NAN};
-        for (std::size_t k = 0; p && p->size() == 3 && k < 3; ++k)
-            point[static_cast<int>(k)] = p->get(k)->value<double>().value_or(NAN);
-        path.push_back(point);
-    }
-    const bool good = !path.empty() && path.size() <= kMaxPathPoints &&
-                      std::all_of(path.begin(), path.end(), [](const Vec3& p) { return norm(p) < 1e15; });
-    if (good) return path;
-    table.fail(key, fmt::format("expected [[x, y, z], ...], 1 to {} points in metres in the body's frame",
-                                kMaxPathPoints));
-    return {};
-}
-
 DemRequest read_request(TableReader& table, const SceneReading& reading) {
     DemRequest r;
     table.require("file", "the name of a DEM");
@@ -72,7 +52,7 @@ DemRequest read_request(TableReader& table, const SceneReading& reading) {
         r.equatorial_m = (*axes)[0], r.polar_m = (*axes)[1];
     r.options.error_px = table.number("error_px", {.low = 0.001, .high = 1000}).value_or(r.options.error_px);
     r.options.error_m = table.number("error_m", kDemLength).value_or(r.options.error_m);
-    r.options.seen_from = read_seen_from(table, "seen_from_m");
+    r.options.seen_from = table.points("seen_from_m", kMaxPathPoints).value_or(std::vector<Vec3>{});
     r.options.budget_bytes = static_cast<std::uint64_t>(table.integer("budget_mib", 1, 1 << 20).value_or(1024))
                              << 20;
     if (auto detail = table.table("detail")) r.detail = read_detail(*detail);
@@ -155,8 +135,7 @@ void load_dem(const NamedDem& named, SceneReading& reading) {
 void read_dem(TableReader& body, int material, SceneReading& reading) {
     NamedDem named{
         .body = reading.scene.bodies.size(), .request = {}, .material = material, .place = body.place("dem")};
-    const toml::node* node = body.find("dem");
-    if (node->is_string()) {
+    if (body.is_text("dem")) {
         named.request.path = (reading.folder / body.text("dem").value_or("")).string();
     } else if (auto table = body.table("dem")) {
         named.request = read_request(*table, reading);

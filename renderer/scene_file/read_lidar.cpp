@@ -62,8 +62,7 @@ LidarMake read_make(TableReader& table, const std::filesystem::path& folder) {
     for (const LidarMake* make : lidar_makes()) makes.emplace_back(make->name, make);
     const LidarMake& first = *makes.front().second;
     table.require("model", fmt::format("\"{}\"", first.name));
-    const toml::node* node = table.find("model");
-    const auto name = node ? node->value<std::string>() : std::nullopt;
+    const auto name = table.is_text("model") ? table.text("model") : std::nullopt;
     if (!name || !name->ends_with(".toml")) return *table.choice<const LidarMake*>("model", makes).value_or(&first);
     auto described = read_lidar_description((folder / *name).string());
     if (described) return *std::move(described);

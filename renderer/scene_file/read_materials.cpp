@@ -50,8 +50,7 @@ void read_texture_table(TableReader table, std::string& file, TextureUse& use) {
 /// A texture is "FILE" or a table; `use` is how it is read where the table does not specify it.
 void read_texture_key(TableReader& table, const char* key, int Material::*slot, TextureUse use,
                       SceneReading& reading) {
-    const toml::node* node = table.find(key);
-    if (!node) return;
+    if (!table.has(key)) return;
     NamedTexture named{.material = static_cast<int>(reading.scene.materials.size()),
                        .slot = slot,
                        .key = key,
@@ -59,10 +58,10 @@ void read_texture_key(TableReader& table, const char* key, int Material::*slot, 
                        .use = use,
                        .place = table.place(key)};
     std::string file;
-    if (node->is_table()) {
-        read_texture_table(*table.table(key), file, named.use);
-    } else if (node->is_string()) {
+    if (table.is_text(key)) {
         file = *table.text(key);
+    } else if (table.is_table(key)) {
+        read_texture_table(*table.table(key), file, named.use);
     } else {
         return table.fail(key, "expected \"FILE\" or {file = \"FILE\", ...}");
     }

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "renderer/keys/based_on.h"
+#include "renderer/keys/toml_file.h"
 #include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
@@ -12,10 +12,16 @@ namespace narpa {
 
 namespace {
 
-bool allowed_in_name(char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
-           c == '.';
-}
+/// The tables of a scene file.
+const Key kSceneFileRows[]{
+    {"scene", rows::table(kSceneKeys)},   {"sun", rows::table(kSunKeys)},
+    {"ambient", rows::table()},           {"stars", rows::table()},
+    {"render", rows::table(kRenderKeys)}, {"body", rows::tables(), "at least one [[body]]"},
+    {"observer", rows::table()},          {"light", rows::tables()},
+    {"camera", rows::tables()},           {"lidar", rows::tables()},
+    {"atmosphere", rows::table()},        {"sky", rows::table()},
+};
+const Keys kSceneFileKeys{.rows = kSceneFileRows};
 
 void read_root(TableReader& root, SceneReading& reading) {
     read_surroundings(root, reading);
@@ -46,16 +52,14 @@ Result<Scene> read_files(const std::string& path) {
     SceneReading reading{
         .scene = {}, .problems = Problems(path), .folder = std::filesystem::path(path).parent_path()};
     reading.scene.file = path;
-    try {
-        const auto table = parse_based_on(path, "scene");
-        if (!table) return table.error();
-        TableReader root(*table, "the scene", reading.problems);
-        read_root(root, reading);
-    } catch (const toml::parse_error& e) {
-        const bool toml = path.ends_with(".toml");
-        reading.problems.add(e.source(),
-                             std::string(e.description()) + (toml ? "" : ", expected a scene file (TOML)"));
+    const auto file = TomlFile::read(path, "scene");
+    if (!file) {
+        Error error = file.error();
+        if (error.line > 0 && !path.ends_with(".toml")) error.what += ", expected a scene file (TOML)";
+        return error;
     }
+    TableReader root = file->root("the scene", reading.problems, &kSceneFileKeys);
+    read_root(root, reading);
     if (!reading.problems.none()) return reading.problems.first();
     warn_of_dark_materials(reading.scene);
     return std::move(reading.scene);
@@ -73,21 +77,6 @@ Status use_method(Scene& scene, RenderSettings::Method method) {
     scene.render.method = method;
     warn_of_dark_materials(scene);
     return Ok{};
-}
-
-std::string read_name(TableReader& table, std::vector<std::string>& taken) {
-    constexpr std::size_t kLongest = 64;
-    table.require("name", "a text");
-    std::string name = table.text("name").value_or("");
-    const bool good =
-        !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), allowed_in_name);
-    if (table.has("name") && !good)
-        table.fail("name", fmt::format("expected 1 to {} letters, digits, '_', '-' or '.'", kLongest));
-    if (good && std::find(taken.begin(), taken.end(), name) != taken.end())
-        table.fail("name",
-                   fmt::format("\"{}\" is the name of another {}, expected a name of its own", name, table.name()));
-    taken.push_back(name);
-    return name;
 }
 
 Result<Scene> read_scene(const std::string& path) {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <set>
 
-#include "renderer/keys/based_on.h"
+#include "renderer/keys/toml_file.h"
 
 namespace narpa {
 namespace {
@@ -16,11 +16,11 @@ public:
     /// `head`: the table that may have `based_on`.
     void add_toml(const fs::path& path, const std::string& head) {
         files_.insert(path.string());
-        try {
-            const auto table = parse_based_on(path.string(), head);
-            if (table) add_node(*table, path.parent_path());
-        } catch (const toml::parse_error&) {  // files that do not parse are left out
-        }
+        const auto file = TomlFile::read(path.string(), head);
+        if (!file) return;  // files that do not parse are left out
+        files_.merge(file->files());
+        for (const std::string& text : file->texts())
+            if (!text.empty()) add_file(path.parent_path() / text);
     }
     void add_file(const fs::path& path) {
         std::error_code unknown;
@@ -31,15 +31,6 @@ public:
     [[nodiscard]] std::vector<std::string> files() const { return {files_.begin(), files_.end()}; }
 
 private:
-    void add_node(const toml::node& node, const fs::path& folder) {
-        if (const auto& path = node.source().path) files_.insert(*path);
-        if (const toml::table* const table = node.as_table())
-            for (const auto& [key, value] : *table) add_node(value, folder);
-        if (const toml::array* const array = node.as_array())
-            for (const toml::node& value : *array) add_node(value, folder);
-        if (const auto* const text = node.as_string(); text && !text->get().empty()) add_file(folder / text->get());
-    }
-
     std::set<std::string> files_;
 };
 

@@ -11,6 +11,7 @@
 #include "renderer/assets/texture_file.h"
 #include "renderer/ephemeris/observed_courses.h"
 #include "renderer/keys/toml_reader.h"
+#include "renderer/scene/mounting.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -21,7 +22,7 @@ struct NamedMesh {
     std::string path;
     double scale = 1, crease_rad = 0;  ///< of read_mesh
     std::optional<int> material;       ///< replaces the mesh's own; index into Scene::materials
-    toml::source_region place;
+    Place place;
 };
 
 /// A texture that a `material` table names.
@@ -31,7 +32,7 @@ struct NamedTexture {
     std::string key;                           ///< "texture", "normal_texture" ...
     std::string path;
     TextureUse use{};
-    toml::source_region place;
+    Place place;
 };
 
 /// A DEM that a body names: read when all else has been found good, as its triangles depend on the sensors.
@@ -39,7 +40,7 @@ struct NamedDem {
     std::size_t body = 0;
     DemRequest request{};
     int material = 0;  ///< index into Scene::materials
-    toml::source_region place;
+    Place place;
 };
 
 /// State while one scene file is read.
@@ -54,6 +55,7 @@ struct SceneReading {
     std::optional<Observing> observer{};
 };
 
+extern const Keys kSceneKeys, kSunKeys, kRenderKeys;
 /// [scene], [sun], [ambient], [render].
 void read_surroundings(TableReader& root, SceneReading& reading);
 /// [stars], with its catalogue. `epoch_year`: that of [scene], if it has one.
@@ -90,21 +92,5 @@ void load_named_files(SceneReading& reading);
 std::optional<int> read_material(TableReader& body, const std::string& name, SceneReading& reading);
 /// The material of a shape for which the scene names none; its index.
 int add_grey_material(const std::string& name, Scene& scene);
-
-struct Mounting {
-    int mount = -1;  ///< body that carries it; -1 is the world
-    Rigid3 T_mount_sensor{};
-};
-
-/// A sensor's attitude from its boresight `forward` and its `right` axis: unit vectors, orthogonal, parent axes.
-using AttitudeOf = Quat (*)(const Vec3& forward, const Vec3& right);
-Quat camera_attitude(const Vec3& forward, const Vec3& right);  ///< x right, y down, z forward; lights too
-Quat lidar_attitude(const Vec3& forward, const Vec3& right);   ///< x right, y forward, z up
-
-/// Where a camera, a LiDAR or a light sits: `mount`, `position_m`, and `attitude_wxyz` or `look_at` with `up`.
-Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of);
-
-/// `name`: 1 to 64 of letters, digits, '_', '-', '.'; used by no other table of its kind (`taken`).
-std::string read_name(TableReader& table, std::vector<std::string>& taken);
 
 }  // namespace narpa

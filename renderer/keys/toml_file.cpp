@@ -1,6 +1,9 @@
-#include "renderer/keys/based_on.h"
+#include "renderer/keys/toml_file.h"
+
+#include <toml++/toml.h>
 
 #include <filesystem>
+#include <sstream>
 
 #include "base/file_bytes.h"
 #include "renderer/keys/toml_depth.h"
@@ -60,14 +63,53 @@ Result<toml::table> parse(const std::string& path, const std::string& head, int 
     return table;
 }
 
+template <class Visit>
+void visit_values(const toml::node& node, const Visit& visit) {
+    visit(node);
+    if (const toml::table* const table = node.as_table())
+        for (const auto& [key, value] : *table) visit_values(value, visit);
+    if (const toml::array* const array = node.as_array())
+        for (const toml::node& value : *array) visit_values(value, visit);
+}
+
 }  // namespace
 
 std::string beside(const std::string& file, const std::string& named) {
     return (std::filesystem::path(file).parent_path() / named).lexically_normal().string();
 }
 
-Result<toml::table> parse_based_on(const std::string& path, const std::string& head) {
-    return parse(path, head, 0);
+Result<TomlFile> TomlFile::read(const std::string& path, const std::string& head) {
+    try {
+        auto table = parse(path, head, 0);
+        if (!table) return table.error();
+        return TomlFile(std::make_shared<const toml::table>(*std::move(table)));
+    } catch (const toml::parse_error& e) {
+        const toml::source_region& at = e.source();
+        return Error{std::string(e.description()), at.path ? *at.path : path, static_cast<int>(at.begin.line),
+                     static_cast<int>(at.begin.column)};
+    }
+}
+
+std::string TomlFile::text() const {
+    std::ostringstream text;
+    text << toml::toml_formatter(*table_);
+    return text.str();
+}
+
+std::set<std::string> TomlFile::files() const {
+    std::set<std::string> files;
+    visit_values(*table_, [&](const toml::node& node) {
+        if (const auto& path = node.source().path) files.insert(*path);
+    });
+    return files;
+}
+
+std::vector<std::string> TomlFile::texts() const {
+    std::vector<std::string> texts;
+    visit_values(*table_, [&](const toml::node& node) {
+        if (const auto* const text = node.as_string()) texts.push_back(text->get());
+    });
+    return texts;
 }
 
 }  // namespace narpa

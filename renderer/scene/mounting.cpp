@@ -1,10 +1,22 @@
+#include "renderer/scene/mounting.h"
+
 #include <fmt/format.h>
 
-#include "renderer/scene_file/scene_parts.h"
+#include <algorithm>
 
 namespace narpa {
 
 namespace {
+
+constexpr Key kMountingRows[]{
+    {"name", rows::text(), "a text"},    {"mount", rows::text()},   {"position_m", rows::vec3()},
+    {"attitude_wxyz", rows::attitude()}, {"look_at", rows::vec3()}, {"up", rows::vec3()},
+};
+
+bool allowed_in_name(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+           c == '.';
+}
 
 int read_mount(TableReader& table, const std::vector<Body>& bodies) {
     const auto name = table.text("mount");
@@ -40,6 +52,8 @@ void read_look_at(TableReader& table, Rigid3& T, AttitudeOf attitude_of) {
 
 }  // namespace
 
+const Keys kMountingKeys{.rows = kMountingRows};
+
 Quat camera_attitude(const Vec3& forward, const Vec3& right) {
     return quat_from_columns(right, cross(forward, right), forward);
 }
@@ -51,10 +65,25 @@ Quat lidar_attitude(const Vec3& forward, const Vec3& right) {
 Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of) {
     Mounting m;
     m.mount = read_mount(table, bodies);
-    m.T_mount_sensor.t = table.vec3("position_m").value_or(Vec3{});
-    m.T_mount_sensor.q = table.attitude("attitude_wxyz").value_or(Quat{});
+    table.read("position_m", m.T_mount_sensor.t);
+    table.read("attitude_wxyz", m.T_mount_sensor.q);
     read_look_at(table, m.T_mount_sensor, attitude_of);
     return m;
+}
+
+std::string read_name(TableReader& table, std::vector<std::string>& taken) {
+    constexpr std::size_t kLongest = 64;
+    table.require("name", "a text");
+    std::string name = table.text("name").value_or("");
+    const bool good =
+        !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), allowed_in_name);
+    if (table.has("name") && !good)
+        table.fail("name", fmt::format("expected 1 to {} letters, digits, '_', '-' or '.'", kLongest));
+    if (good && std::find(taken.begin(), taken.end(), name) != taken.end())
+        table.fail("name",
+                   fmt::format("\"{}\" is the name of another {}, expected a name of its own", name, table.name()));
+    taken.push_back(name);
+    return name;
 }
 
 }  // namespace narpa

@@ -1,0 +1,31 @@
+/// renderer/scene/mounting.h - the keys that cameras, LiDARs and lights share: their name, and where they sit.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "renderer/keys/toml_reader.h"
+#include "renderer/scene/scene.h"
+
+namespace narpa {
+
+/// `name`, `mount`, `position_m`, `attitude_wxyz`, `look_at`, `up`: a part of the Keys of what is mounted.
+extern const Keys kMountingKeys;
+
+struct Mounting {
+    int mount = -1;  ///< body that carries it; -1 is the world
+    Rigid3 T_mount_sensor{};
+};
+
+/// A sensor's attitude from its boresight `forward` and its `right` axis: unit vectors, orthogonal, parent axes.
+using AttitudeOf = Quat (*)(const Vec3& forward, const Vec3& right);
+Quat camera_attitude(const Vec3& forward, const Vec3& right);  ///< x right, y down, z forward; lights too
+Quat lidar_attitude(const Vec3& forward, const Vec3& right);   ///< x right, y forward, z up
+
+/// Where a camera, a LiDAR or a light sits: `mount`, `position_m`, and `attitude_wxyz` or `look_at` with `up`.
+Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of);
+
+/// `name`: 1 to 64 of letters, digits, '_', '-', '.'; used by no other table of its kind (`taken`).
+std::string read_name(TableReader& table, std::vector<std::string>& taken);
+
+}  // namespace narpa

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "estimator/dense/dense_tuning.h"
-#include "estimator/least_squares/levenberg_marquardt.h"
+#include "estimator/least_squares/symmetric.h"
 #include "renderer/camera/scene_camera.h"
 
 namespace narpa {
@@ -230,7 +230,11 @@ bool LevelSolver::linearise() {
 LevelSolver::Step LevelSolver::next_step(double damping) const {
     const Matrix6 information = equations_.pose_information();
     Step s;
-    s.pose = stride_ * damped_step({information, equations_.pose_gradient()}, damping).h;
+    // LDLT, not damped_step: the information of a frame that shows next to nothing is indefinite by rounding, and
+    // its step leads to a pose that is refused for what the image shows.
+    Matrix6 damped = information;
+    damped.diagonal() *= 1 + damping;
+    s.pose = stride_ * ldlt_solve(damped, equations_.pose_gradient());
     s.sigmas = std::sqrt(std::max(s.pose.dot(information * s.pose), 0.0)) / robust_.scale;
     s.motion_px = distance_px(s.pose);
     s.size = s.motion_px / converged_px_;

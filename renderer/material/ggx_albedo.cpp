@@ -8,7 +8,7 @@ namespace {
 
 using namespace ggx_table;
 
-Place index_place(double ior) {
+TablePlace index_place(double ior) {
     return place(std::sqrt(2 * std::max(0.0, (ior - 1) / (ior + 1))), kIndices);
 }
 }  // namespace
@@ -28,7 +28,7 @@ double GgxAlbedo::dielectric(Interface i, double mu) const noexcept {
         return std::min(1.0, kTables.cosine[static_cast<std::size_t>(index)].at(roughness_, mu) * (mu + alpha_));
     };
     if (i.schlick) return at(mu) * schlick(normal_reflectance(i.ior), cosine(kIndices));
-    const Place n = index_place(i.ior);
+    const TablePlace n = index_place(i.ior);
     const double c = cosine(n.node) * (1 - n.beyond) + cosine(n.node + 1) * n.beyond;
     return at(mu) * fresnel_dielectric(c, i.ior);
 }
@@ -42,7 +42,7 @@ double GgxAlbedo::dielectric_mean(Interface i) const noexcept {
         const double r0 = normal_reflectance(i.ior);
         return r0 * mean() + (1 - r0) * mean_schlick_power();
     }
-    const Place n = index_place(i.ior), row = place(roughness_, kCosineRoughnessNodes);
+    const TablePlace n = index_place(i.ior), row = place(roughness_, kCosineRoughnessNodes);
     const auto reflected = [&](int index) {
         return between(kTables.mean_reflected[static_cast<std::size_t>(index)].data(), row);
     };

@@ -405,12 +405,13 @@ bool TableReader::is_table(std::string_view key) {
     return node && node->is_table();
 }
 
-std::optional<TableReader> TableReader::table(std::string_view key) {
+std::optional<TableReader> TableReader::table(std::string_view key, const Keys* keys) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
-    if (const toml::table* t = node->as_table())
-        return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_,
-                           row(key, Value::Type::table).keys);
+    if (const toml::table* t = node->as_table()) {
+        if (keys_) keys = row(key, Value::Type::table).keys;
+        return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_, keys);
+    }
     fail(key, fmt::format("got {}, expected a table", shown(*node)));
     return std::nullopt;
 }

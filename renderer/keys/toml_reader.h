@@ -149,7 +149,8 @@ public:
     }
     /// The index of a choice among the words of its row.
     std::optional<std::size_t> word(std::string_view key);
-    std::optional<TableReader> table(std::string_view key);
+    /// `keys`: those of the table where the row of `key` names none.
+    std::optional<TableReader> table(std::string_view key, const Keys* keys = nullptr);
     /// The tables of `[[key]]`, in the file's order.
     std::vector<TableReader> tables(std::string_view key);
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "base/constants.h"
@@ -15,29 +16,76 @@ namespace {
 
 constexpr Range kLength{.low = 0, .high = 1e3};
 
+using Multipath = LidarReceiverModel::Multipath;
+constexpr std::array<std::pair<std::string_view, Multipath>, 3> kMultipaths{
+    {{"none", Multipath::none}, {"mirrors", Multipath::mirrors}, {"diffuse", Multipath::diffuse}}};
+constexpr std::array<std::pair<std::string_view, LidarReturns>, 3> kReturns{
+    {{"strongest", LidarReturns::strongest}, {"last", LidarReturns::last}, {"dual", LidarReturns::dual}}};
+constexpr std::array<std::pair<std::string_view, LidarPps>, 4> kPpsStates{
+    {{"absent", LidarPps::absent},
+     {"synchronising", LidarPps::synchronising},
+     {"locked", LidarPps::locked},
+     {"error", LidarPps::error}}};
+
+std::vector<std::string_view> make_names() {
+    std::vector<std::string_view> names;
+    for (const LidarMake* make : lidar_makes()) names.push_back(make->name);
+    return names;
+}
+
+std::vector<std::string_view> profile_names() {
+    std::vector<std::string_view> names;
+    for (const LidarMake* make : lidar_makes())
+        for (const std::string_view profile : make->profiles)
+            if (std::ranges::find(names, profile) == names.end()) names.push_back(profile);
+    return names;
+}
+
+/// Makes narrow the ranges of `rate_hz`, `columns`, `range_min_m` and `range_max_m`.
+constexpr Key kLidarRows[]{
+    {"model", rows::or_file(rows::choice(make_names)), "\"VLP-16\""},
+    {"rate_hz", rows::number({.low = 0, .high = 1e4, .low_open = true})},
+    {"pps", rows::choice<kPpsStates>()},
+    {"returns", rows::choice<kReturns>()},
+    {"profile", rows::choice(profile_names)},
+    {"columns", rows::integer(1, 65536)},
+    {"calibration", rows::file()},
+    {"range_max_m", rows::number(kPositive)},
+    {"range_min_m", rows::number(kNotNegative)},
+    {"beam_divergence_rad", rows::number({.low = 0, .high = 0.1})},
+    {"sub_rays", rows::integer(1, LidarReceiverModel::kMaxSubRays)},
+    {"pulse_length_m", rows::number(kLength)},
+    {"multipath", rows::choice<kMultipaths>()},
+    {"range_at_10_percent_m", rows::number({.low = 0, .high = 1e6, .low_open = true})},
+    {"detection_snr", rows::number(kLength)},
+    {"sunlight_noise", rows::number({.low = 0, .high = 1e6})},
+    {"range_noise_at_limit_m", rows::number(kLength)},
+    {"range_walk_m", rows::number({.low = -1e3, .high = 1e3})},
+    {"range_bias_m", rows::number({.low = -1e3, .high = 1e3})},
+    {"range_noise_m", rows::number(kLength)},
+    {"range_ambiguity_m", rows::number({.low = 0, .high = 1e9, .low_open = true})},
+    {"velocity_noise_m_s", rows::number(kLength)},
+    {"velocity_ambiguity_m_s", rows::number({.low = 0, .high = 1e6, .low_open = true})},
+};
+
 void read_beam(TableReader& table, LidarReceiverModel& r) {
-    r.beam_divergence_rad = table.number("beam_divergence_rad", {.low = 0, .high = 0.1}).value_or(0);
-    r.sub_rays = static_cast<int>(
-        table.integer("sub_rays", 1, LidarReceiverModel::kMaxSubRays).value_or(r.beam_divergence_rad > 0 ? 32 : 1));
+    table.read("beam_divergence_rad", r.beam_divergence_rad);
+    r.sub_rays = static_cast<int>(table.integer("sub_rays").value_or(r.beam_divergence_rad > 0 ? 32 : 1));
     if (r.sub_rays > 1 && r.sub_rays < LidarReceiverModel::kMinSubRays)
         table.fail("sub_rays", fmt::format("{} is too few, expected 1, or {} to {}", r.sub_rays,
                                            LidarReceiverModel::kMinSubRays, LidarReceiverModel::kMaxSubRays));
     if (r.sub_rays > 1 && r.beam_divergence_rad == 0)
         table.require("beam_divergence_rad", "a number > 0, as sub_rays sample the beam's cone");
-    r.pulse_length_m = table.number("pulse_length_m", kLength).value_or(r.pulse_length_m);
-    using enum LidarReceiverModel::Multipath;
-    static constexpr std::array<std::pair<std::string_view, LidarReceiverModel::Multipath>, 3> kMultipaths{
-        {{"none", none}, {"mirrors", mirrors}, {"diffuse", diffuse}}};
-    r.multipath = table.choice<LidarReceiverModel::Multipath>("multipath", kMultipaths).value_or(none);
+    table.read("pulse_length_m", r.pulse_length_m);
+    r.multipath = table.choice("multipath", kMultipaths).value_or(Multipath::none);
 }
 
 void read_detection(TableReader& table, LidarReceiverModel& r) {
-    r.range_at_10_percent_m =
-        table.number("range_at_10_percent_m", {.low = 0, .high = 1e6, .low_open = true}).value_or(0);
-    r.detection_snr = table.number("detection_snr", {.low = 0, .high = 1e3}).value_or(0);
-    r.sunlight_noise = table.number("sunlight_noise", {.low = 0, .high = 1e6}).value_or(0);
-    r.range_noise_at_limit_m = table.number("range_noise_at_limit_m", kLength).value_or(0);
-    r.range_walk_m = table.number("range_walk_m", {.low = -1e3, .high = 1e3}).value_or(0);
+    table.read("range_at_10_percent_m", r.range_at_10_percent_m);
+    table.read("detection_snr", r.detection_snr);
+    table.read("sunlight_noise", r.sunlight_noise);
+    table.read("range_noise_at_limit_m", r.range_noise_at_limit_m);
+    table.read("range_walk_m", r.range_walk_m);
     if (r.range_at_10_percent_m == 0)
         for (const char* key : {"detection_snr", "sunlight_noise", "range_noise_at_limit_m", "range_walk_m"})
             table.refuse(key, "counts from the echo that is just detected: there is no range_at_10_percent_m");
@@ -47,23 +95,20 @@ LidarReceiverModel read_receiver(TableReader& table) {
     LidarReceiverModel r;
     read_beam(table, r);
     read_detection(table, r);
-    r.range_bias_m = table.number("range_bias_m", {.low = -1e3, .high = 1e3}).value_or(0);
-    r.range_noise_m = table.number("range_noise_m", kLength).value_or(0);
-    r.range_ambiguity_m = table.number("range_ambiguity_m", {.low = 0, .high = 1e9, .low_open = true}).value_or(0);
-    r.velocity_noise_m_s = table.number("velocity_noise_m_s", kLength).value_or(0);
-    r.velocity_ambiguity_m_s =
-        table.number("velocity_ambiguity_m_s", {.low = 0, .high = 1e6, .low_open = true}).value_or(0);
+    table.read("range_bias_m", r.range_bias_m);
+    table.read("range_noise_m", r.range_noise_m);
+    table.read("range_ambiguity_m", r.range_ambiguity_m);
+    table.read("velocity_noise_m_s", r.velocity_noise_m_s);
+    table.read("velocity_ambiguity_m_s", r.velocity_ambiguity_m_s);
     return r;
 }
 
 /// A make built into narpa, or one that a file describes.
 LidarMake read_make(TableReader& table, const std::filesystem::path& folder) {
-    std::vector<std::pair<std::string_view, const LidarMake*>> makes;
-    for (const LidarMake* make : lidar_makes()) makes.emplace_back(make->name, make);
-    const LidarMake& first = *makes.front().second;
-    table.require("model", fmt::format("\"{}\"", first.name));
+    const auto makes = lidar_makes();
+    const LidarMake& first = *makes.front();
     const auto name = table.is_text("model") ? table.text("model") : std::nullopt;
-    if (!name || !name->ends_with(".toml")) return *table.choice<const LidarMake*>("model", makes).value_or(&first);
+    if (!name || !name->ends_with(".toml")) return *makes[table.word("model").value_or(0)];
     auto described = read_lidar_description((folder / *name).string());
     if (described) return *std::move(described);
     table.fail("model", described.error().text());
@@ -71,17 +116,8 @@ LidarMake read_make(TableReader& table, const std::filesystem::path& folder) {
 }
 
 LidarReturns read_returns(TableReader& table, const LidarMake& make) {
-    using enum LidarReturns;
-    static constexpr std::array<std::pair<std::string_view, LidarReturns>, 3> kReturns{
-        {{"strongest", strongest}, {"last", last}, {"dual", dual}}};
-    return table.choice<LidarReturns>("returns", std::span(kReturns).first(make.dual ? 3 : 2)).value_or(strongest);
-}
-
-LidarPps read_pps(TableReader& table) {
-    using enum LidarPps;
-    static constexpr std::array<std::pair<std::string_view, LidarPps>, 4> kStates{
-        {{"absent", absent}, {"synchronising", synchronising}, {"locked", locked}, {"error", error}}};
-    return table.choice<LidarPps>("pps", kStates).value_or(locked);
+    const std::span all(kReturns);
+    return table.choice<LidarReturns>("returns", all.first(make.dual ? 3 : 2)).value_or(LidarReturns::strongest);
 }
 
 /// Reads packet profile, columns and the maker's calibration file, for makes that have them.
@@ -113,7 +149,7 @@ LidarSettings read_settings(TableReader& table, const LidarMake& make, const std
     LidarSettings settings;
     settings.rate_hz =
         table.number("rate_hz", {.low = make.rate_hz_min, .high = make.rate_hz_max}).value_or(make.rate_hz_default);
-    settings.pps = read_pps(table);
+    settings.pps = table.choice("pps", kPpsStates).value_or(LidarPps::locked);
     if (make.complete) {
         read_mode(table, make, folder, settings);
         return settings;
@@ -136,6 +172,8 @@ bool lights_an_area(const Lidar& lidar) {
 
 }  // namespace
 
+const Keys kLidarKeys{.rows = kLidarRows, .parts = {&kMountingKeys}};
+
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                  const std::filesystem::path& folder) {
     Lidar lidar;
@@ -156,7 +194,7 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
     if (!lidar.model->spec().measures_velocity)
         for (const char* key : {"velocity_noise_m_s", "velocity_ambiguity_m_s"})
             table.refuse(key, fmt::format("a {} measures no velocity", make.name));
-    if (lidar.receiver.multipath == LidarReceiverModel::Multipath::diffuse && !lights_an_area(lidar))
+    if (lidar.receiver.multipath == Multipath::diffuse && !lights_an_area(lidar))
         table.fail("multipath",
                    "\"diffuse\" is of beams that light an area: expected a beam_divergence_rad, or a model whose "
                    "[grid] is a flash");

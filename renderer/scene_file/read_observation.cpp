@@ -11,17 +11,36 @@ namespace narpa {
 namespace {
 
 constexpr Range kAngle_deg{.low = -360, .high = 360};
+constexpr Key kObserverRows[]{
+    {"latitude_deg", rows::number({.low = -90, .high = 90}), "the geodetic latitude, north positive"},
+    {"longitude_deg", rows::number(kAngle_deg), "the longitude, east positive"},
+    {"height_m", rows::number({.low = -1000, .high = 20'000})},
+    {"ut1_utc_s", rows::number({.low = -0.9, .high = 0.9})},
+    {"temperature_c", rows::number({.low = -80, .high = 60})},
+    {"pressure_hpa", rows::number({.low = 0, .high = 1200})},
+    {"refraction", rows::boolean()},
+    {"earth", rows::text()},
+    {"sees", rows::texts()},
+    {"sun", rows::boolean()},
+};
+constexpr Key kOrbitRows[]{
+    {"semi_major_axis_m", rows::number({.low = 6.4e6, .high = 1e9}), "a length from the Earth's centre"},
+    {"eccentricity", rows::number({.low = 0, .high = 1, .high_open = true})},
+    {"inclination_deg", rows::number(kAngle_deg)},
+    {"ascending_node_deg", rows::number(kAngle_deg)},
+    {"argument_of_perigee_deg", rows::number(kAngle_deg)},
+    {"mean_anomaly_deg", rows::number(kAngle_deg)},
+};
+constexpr Key kTrackingRows[]{{"track", rows::text()}, {"azimuth_elevation_deg", rows::pair(kAngle_deg)}};
 
 ObserverPlace read_place(TableReader& table) {
     ObserverPlace place;
-    table.require("latitude_deg", "the geodetic latitude, north positive");
-    table.require("longitude_deg", "the longitude, east positive");
-    place.latitude_rad = kRadPerDeg * table.number("latitude_deg", {.low = -90, .high = 90}).value_or(0);
-    place.longitude_rad = kRadPerDeg * table.number("longitude_deg", kAngle_deg).value_or(0);
-    place.height_m = table.number("height_m", {.low = -1000, .high = 20'000}).value_or(0);
-    place.ut1_utc_s = table.number("ut1_utc_s", {.low = -0.9, .high = 0.9}).value_or(0);
-    place.temperature_k = 273.15 + table.number("temperature_c", {.low = -80, .high = 60}).value_or(10);
-    place.pressure_hpa = table.number("pressure_hpa", {.low = 0, .high = 1200}).value_or(1010);
+    place.latitude_rad = kRadPerDeg * table.number("latitude_deg").value_or(0);
+    place.longitude_rad = kRadPerDeg * table.number("longitude_deg").value_or(0);
+    place.height_m = table.number("height_m").value_or(0);
+    place.ut1_utc_s = table.number("ut1_utc_s").value_or(0);
+    place.temperature_k = 273.15 + table.number("temperature_c").value_or(10);
+    place.pressure_hpa = table.number("pressure_hpa").value_or(1010);
     return place;
 }
 
@@ -48,19 +67,18 @@ void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<
 
 }  // namespace
 
+const Keys kObserverKeys{.rows = kObserverRows}, kOrbitKeys{.rows = kOrbitRows},
+    kTrackingKeys{.rows = kTrackingRows};
+
 void read_orbit(TableReader& body_table, Body& body) {
-    auto table = body_table.table("orbit");
+    auto table = body_table.table("orbit", &kOrbitKeys);
     if (!table) return;
     for (const std::string_view key : {"position_m", "velocity_m_s"})
         body_table.refuse(key, "the body has an orbit, which gives it; expected one of the two");
     OrbitalElements o;
-    table->require("semi_major_axis_m", "a length from the Earth's centre");
-    o.semi_major_axis_m =
-        table->number("semi_major_axis_m", {.low = 6.4e6, .high = 1e9}).value_or(o.semi_major_axis_m);
-    o.eccentricity = table->number("eccentricity", {.low = 0, .high = 1, .high_open = true}).value_or(0);
-    const auto angle = [&](std::string_view key) {
-        return kRadPerDeg * table->number(key, kAngle_deg).value_or(0);
-    };
+    table->read("semi_major_axis_m", o.semi_major_axis_m);
+    o.eccentricity = table->number("eccentricity").value_or(0);
+    const auto angle = [&](std::string_view key) { return kRadPerDeg * table->number(key).value_or(0); };
     o.inclination_rad = angle("inclination_deg");
     o.ascending_node_rad = angle("ascending_node_deg");
     o.argument_of_perigee_rad = angle("argument_of_perigee_deg");

@@ -14,12 +14,18 @@ namespace {
 
 /// The tables of a scene file.
 const Key kSceneFileRows[]{
-    {"scene", rows::table(kSceneKeys)},   {"sun", rows::table(kSunKeys)},
-    {"ambient", rows::table()},           {"stars", rows::table()},
-    {"render", rows::table(kRenderKeys)}, {"body", rows::tables(), "at least one [[body]]"},
-    {"observer", rows::table()},          {"light", rows::tables()},
-    {"camera", rows::tables()},           {"lidar", rows::tables()},
-    {"atmosphere", rows::table()},        {"sky", rows::table()},
+    {"scene", rows::table(kSceneKeys)},
+    {"sun", rows::table(kSunKeys)},
+    {"ambient", rows::table()},
+    {"stars", rows::table()},
+    {"render", rows::table(kRenderKeys)},
+    {"body", rows::tables(), "at least one [[body]]"},
+    {"observer", rows::table(kObserverKeys)},
+    {"light", rows::tables()},
+    {"camera", rows::tables()},
+    {"lidar", rows::tables(kLidarKeys)},
+    {"atmosphere", rows::table()},
+    {"sky", rows::table()},
 };
 const Keys kSceneFileKeys{.rows = kSceneFileRows};
 

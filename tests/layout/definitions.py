@@ -9,7 +9,7 @@ import re
 import sys
 
 TYPE = re.compile(r"(?:template <.*> )?(?:struct|class|union|enum(?: class)?) (?:alignas\(.*?\) |\[\[\w+\]\] )?([\w:]+)(?: final)?(?: :.*)? \{")
-NAMESPACE = re.compile(r"namespace ([\w:]*) ?\{")
+NAMESPACE = re.compile(r"(?:inline )?namespace ([\w:]*) ?\{")
 
 
 def types_of(file):

@@ -8,16 +8,16 @@
 namespace narpa::ggx_table {
 
 /// A position between two nodes of a uniform axis.
-struct Place {
+struct TablePlace {
     int node;
     double beyond;
 };
-inline Place place(double where, int nodes) {
+inline TablePlace place(double where, int nodes) {
     const double x = std::clamp(where, 0.0, 1.0) * (nodes - 1);
     const int node = std::min(static_cast<int>(x), nodes - 2);
     return {node, x - node};
 }
-inline double between(const float* values, const Place& at) {
+inline double between(const float* values, const TablePlace& at) {
     return static_cast<double>(values[at.node]) * (1 - at.beyond) +
            static_cast<double>(values[at.node + 1]) * at.beyond;
 }
@@ -30,7 +30,7 @@ struct Table {
 
     [[nodiscard]] double at(double roughness, double mu) const {
         const double alpha = roughness * roughness;
-        const Place row = place(roughness, kRows),
+        const TablePlace row = place(roughness, kRows),
                     column = place(std::sqrt(mu * (1 + alpha) / (mu + alpha)), kColumns);
         const float* const first = &values[static_cast<std::size_t>(row.node * kColumns)];
         return between(first, column) * (1 - row.beyond) + between(first + kColumns, column) * row.beyond;

@@ -126,8 +126,8 @@ Result<StereoBench> measure_stereo(const Scene& scene, int points,
     const Camera& camera = l.unit.camera();
     out.pair = {camera, r.unit.camera(), inverse(r.T_world_camera) * l.T_world_camera};
 
-    const Pinhole p = paraxial_pinhole(*camera.model);
-    const auto middle = l.surface({p.cx, p.cy});
+    const Pinhole pinhole = paraxial_pinhole(*camera.model);
+    const auto middle = l.surface({pinhole.cx, pinhole.cy});
     if (!middle)
         return Error{"the middle of the left frame sees no surface, expected ground to measure from", scene.file};
     auto left_frame = l.frame();

@@ -248,10 +248,10 @@ std::string to_text(const std::vector<ConsistencyRow>& rows) {
                            r.trials(), r.answers[0], r.answers[1], r.answers[2], r.answers[3], r.beyond,
                            nees.mean(), quantile(r.nees, 0.5), turn.rms() / kDegree, 100 * shift.rms());
     };
-    using Key = std::function<std::string(const ConsistencyRow&)>;
-    for (const Key& key : {Key([](const ConsistencyRow& r) { return r.method; }),
-                           Key([](const ConsistencyRow& r) { return r.method + ", " + r.target; }),
-                           Key([](const ConsistencyRow& r) { return r.method + ", " + r.condition; })}) {
+    using GroupKey = std::function<std::string(const ConsistencyRow&)>;
+    for (const GroupKey& key : {GroupKey([](const ConsistencyRow& r) { return r.method; }),
+                                GroupKey([](const ConsistencyRow& r) { return r.method + ", " + r.target; }),
+                                GroupKey([](const ConsistencyRow& r) { return r.method + ", " + r.condition; })}) {
         std::map<std::string, ConsistencyRow> sums;
         for (const ConsistencyRow& r : rows) sums[key(r)].add(r);
         for (const auto& [name, sum] : sums) line(name, sum);

@@ -20,10 +20,20 @@ constexpr bool owns(const SetLayout& m, std::uint32_t id) noexcept {
     return index < m.frames.size() || (m.fd_counter_bit != 0 && index == kFdOffset);
 }
 
-/// Identifiers of the table's messages do not collide, and signals lie within their frames.
-constexpr bool is_consistent() {
-    for (std::uint32_t id = 0; id <= 0x7FF; ++id)
+/// Identifiers of the table's messages do not collide. In four parts, as compilers limit the steps of an
+/// evaluation.
+constexpr bool is_unique(std::uint32_t from) {
+    for (std::uint32_t id = from; id < from + 0x200; ++id)
         if (std::ranges::count_if(kMessages, [id](const SetLayout* m) { return owns(*m, id); }) > 1) return false;
+    return true;
+}
+static_assert(is_unique(0));
+static_assert(is_unique(0x200));
+static_assert(is_unique(0x400));
+static_assert(is_unique(0x600));
+
+/// Signals lie within their frames.
+constexpr bool is_consistent() {
     for (const SetLayout* m : kMessages)
         for (const Signal& s : m->signals)
             if (s.classic.frame >= m->frames.size() ||

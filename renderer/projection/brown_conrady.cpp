@@ -97,13 +97,16 @@ NARPA_EACH_ISA void directions_of(const Model& m, const Pinhole& pinhole, const 
 
 namespace {
 
-constexpr std::array<Key, 1> kKeys{{{"coefficients", rows::numbers({4, 5, 8, 12}), kCoefficients}}};
-constexpr std::array<RosName, 2> kRosNames{{{"plumb_bob", 5}, {"rational_polynomial", 12}}};
+constexpr std::array<Key, 1> kBrownConradyKeys{{{"coefficients", rows::numbers({4, 5, 8, 12}), kCoefficients}}};
+constexpr std::array<RosName, 2> kBrownConradyRosNames{{{"plumb_bob", 5}, {"rational_polynomial", 12}}};
 
 }  // namespace
 
-constinit const ProjectionKind kBrownConrady{
-    .name = "brown_conrady", .opencv = "opencv", .ros = kRosNames, .keys = kKeys, .make = make_model<BrownConrady>};
+constinit const ProjectionKind kBrownConrady{.name = "brown_conrady",
+                                             .opencv = "opencv",
+                                             .ros = kBrownConradyRosNames,
+                                             .keys = kBrownConradyKeys,
+                                             .make = make_model<BrownConrady>};
 
 BrownConrady::BrownConrady(const Pinhole& pinhole, std::span<const double> coefficients)
     : CalibratedModel(kBrownConrady, pinhole, coefficients),

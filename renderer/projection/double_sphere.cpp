@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::array<Key, 2> kKeys{{
+constexpr std::array<Key, 2> kDoubleSphereKeys{{
     {"xi", rows::number({.low = -1, .high = 1, .low_open = true, .high_open = true}), "a number in (-1, 1)"},
     {"alpha", rows::number({.low = 0, .high = 1}), "a number in [0, 1]"},
 }};
@@ -48,7 +48,7 @@ double cos_at_rim(double xi, double alpha) noexcept {
 }  // namespace
 
 constinit const ProjectionKind kDoubleSphere{
-    .name = "double_sphere", .keys = kKeys, .fov_max_deg = 360, .make = make_model<DoubleSphere>};
+    .name = "double_sphere", .keys = kDoubleSphereKeys, .fov_max_deg = 360, .make = make_model<DoubleSphere>};
 
 DoubleSphere::DoubleSphere(const Pinhole& pinhole, std::span<const double> xi_alpha)
     : CalibratedModel(kDoubleSphere, pinhole, xi_alpha),

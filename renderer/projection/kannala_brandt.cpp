@@ -79,15 +79,15 @@ NARPA_EACH_ISA void directions_of(const KannalaBrandt& m, const Pinhole& pinhole
 
 namespace {
 
-constexpr std::array<Key, 1> kKeys{{{"coefficients", rows::numbers({4}), kCoefficients}}};
-constexpr std::array<RosName, 2> kRosNames{{{"equidistant", 4}, {"fisheye", 4}}};
+constexpr std::array<Key, 1> kKannalaBrandtKeys{{{"coefficients", rows::numbers({4}), kCoefficients}}};
+constexpr std::array<RosName, 2> kKannalaBrandtRosNames{{{"equidistant", 4}, {"fisheye", 4}}};
 
 }  // namespace
 
 constinit const ProjectionKind kKannalaBrandt{.name = "kannala_brandt",
                                               .opencv = "fisheye",
-                                              .ros = kRosNames,
-                                              .keys = kKeys,
+                                              .ros = kKannalaBrandtRosNames,
+                                              .keys = kKannalaBrandtKeys,
                                               .fov_max_deg = 360,
                                               .make = make_model<KannalaBrandt>};
 

@@ -31,7 +31,7 @@ struct Table {
     [[nodiscard]] double at(double roughness, double mu) const {
         const double alpha = roughness * roughness;
         const TablePlace row = place(roughness, kRows),
-                    column = place(std::sqrt(mu * (1 + alpha) / (mu + alpha)), kColumns);
+                         column = place(std::sqrt(mu * (1 + alpha) / (mu + alpha)), kColumns);
         const float* const first = &values[static_cast<std::size_t>(row.node * kColumns)];
         return between(first, column) * (1 - row.beyond) + between(first + kColumns, column) * row.beyond;
     }

@@ -34,7 +34,8 @@ TEST(Check, ReportsLightsMethodAndMaterialsByKind) {
     EXPECT_EQ(said.status, 0) << said.out;
     for (const char* words :
          {"render: path tracing over at most 12 surfaces, 4 samples per pixel\n",
-          "materials: 1 akimov, 1 dielectric, 1 ggx, 1 hapke, 2 lambert, 1 lommel_seeliger, 1 lunar_lambert, 1 mirror, 2 "
+          "materials: 1 akimov, 1 dielectric, 1 ggx, 1 hapke, 2 lambert, 1 lommel_seeliger, 1 lunar_lambert, 1 "
+          "mirror, 2 "
           "phong\n",
           "light beacon: point on body target\n", "light earthshine: directional\n",
           "light floodlight: disc of radius 0.05 m on body chaser\n", "light panel: rectangle of 1 x 0.5 m\n",

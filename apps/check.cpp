@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -31,14 +32,17 @@
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/keys/json_schema.h"
 #include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/kind_names.h"
+#include "renderer/scene_file/lidar_description.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::cli {
 namespace {
 
 struct CheckOptions {
-    std::string scene, dbc, calibration;
+    std::string scene, dbc, calibration, schema;
     std::vector<std::string> devices;
     DeviceOptions named;
 };
@@ -476,7 +480,22 @@ nlohmann::json describe(const rehearsal::Scenario& s) {
             {"legs_s", s.legs_duration_s()}};
 }
 
+/// Kinds of files that have a schema.
+struct SchemaRow {
+    std::string name;
+    const Keys& keys;
+};
+const std::array<SchemaRow, 2> kSchemas{{{"scene", kSceneFileKeys}, {"lidar", kLidarDescriptionKeys}}};
+
+Outcome print_schema(const std::string& name) {
+    const auto row = std::ranges::find(kSchemas, name, &SchemaRow::name);
+    fmt::print("{}", json_schema(row->keys, fmt::format("narpa {}", name)));
+    return nlohmann::json::object();
+}
+
 Outcome check(const CheckOptions& o) {
+    if (!o.schema.empty()) return print_schema(o.schema);
+    if (o.scene.empty()) return Error{"SCENE is required"};
     nlohmann::json document;
     std::string scene_file = o.scene;
     if (const auto named = find_file(FileKind::scene, o.scene); !named) {
@@ -538,7 +557,7 @@ Outcome check(const CheckOptions& o) {
 Command add_check(Parser app) {
     auto o = std::make_shared<CheckOptions>();
     const Parser c = app.subcommand("check", "Check a scene or scenario and this machine; names what is missing");
-    c.option("SCENE", o->scene, "Scene or scenario file (TOML), or a name that `narpa list` shows").required();
+    c.option("SCENE", o->scene, "Scene or scenario file (TOML), or a name that `narpa list` shows");
     c.option("DEVICE", o->devices,
              "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, usb:, /dev/video10, "
              "bulk: ... One that may be several things, such as udp:, needs its option");
@@ -549,6 +568,10 @@ Command add_check(Parser app) {
          "sensor")
         .type_name("DIR");
     c.option("--dbc", o->dbc, "Write the DBC of the scene's commanded bodies to this file").type_name("FILE");
+    std::vector<std::string> schemas;
+    for (const SchemaRow& row : kSchemas) schemas.push_back(row.name);
+    c.option("--schema", o->schema, "Print the JSON schema of such files, for editors, and check nothing")
+        .one_of(schemas);
     c.group("Start here");
     c.examples({"narpa check docking", "narpa check my-scene.toml vcan0 /dev/video10",
                 "narpa check docking --can vcan0 --video nav=tcp:5000 --lidar top=udp:192.168.1.70:2368",

@@ -54,8 +54,10 @@ Json value_schema(const Value& value, const Keys& keys) {
             for (const Kind& k : keys.kinds()) names.push_back(k.name);
             return {{"enum", names}};
         }
-        case table: return table_schema(*value.keys);
-        case tables: return {{"type", "array"}, {"items", table_schema(*value.keys)}};
+        case table: return value.keys ? table_schema(*value.keys) : Json{{"type", "object"}};
+        case tables:
+            return {{"type", "array"},
+                    {"items", value.keys ? table_schema(*value.keys) : Json{{"type", "object"}}}};
     }
     return Json::object();
 }

@@ -52,7 +52,7 @@ void read_look_at(TableReader& table, Rigid3& T, AttitudeOf attitude_of) {
 
 }  // namespace
 
-const Keys kMountingKeys{.rows = kMountingRows};
+constinit const Keys kMountingKeys{.rows = kMountingRows};
 
 Quat camera_attitude(const Vec3& forward, const Vec3& right) {
     return quat_from_columns(right, cross(forward, right), forward);

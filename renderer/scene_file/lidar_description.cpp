@@ -260,7 +260,7 @@ Result<LidarMake> read_description(const std::string& file) {
 
 }  // namespace
 
-const Keys kLidarDescriptionKeys{.rows = kDescriptionRows};
+constinit const Keys kLidarDescriptionKeys{.rows = kDescriptionRows};
 
 Result<LidarMake> read_lidar_description(const std::string& file) {
     try {

@@ -172,7 +172,7 @@ bool lights_an_area(const Lidar& lidar) {
 
 }  // namespace
 
-const Keys kLidarKeys{.rows = kLidarRows, .parts = {&kMountingKeys}};
+constinit const Keys kLidarKeys{.rows = kLidarRows, .parts = {&kMountingKeys}};
 
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                  const std::filesystem::path& folder) {

@@ -67,7 +67,7 @@ void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<
 
 }  // namespace
 
-const Keys kObserverKeys{.rows = kObserverRows}, kOrbitKeys{.rows = kOrbitRows},
+constinit const Keys kObserverKeys{.rows = kObserverRows}, kOrbitKeys{.rows = kOrbitRows},
     kTrackingKeys{.rows = kTrackingRows};
 
 void read_orbit(TableReader& body_table, Body& body) {

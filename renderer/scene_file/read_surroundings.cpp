@@ -101,7 +101,7 @@ void read_render(TableReader& root, Scene& scene) {
 
 }  // namespace
 
-const Keys kSceneKeys{.rows = kSceneRows}, kSunKeys{.rows = kSunRows}, kRenderKeys{.rows = kRenderRows};
+constinit const Keys kSceneKeys{.rows = kSceneRows}, kSunKeys{.rows = kSunRows}, kRenderKeys{.rows = kRenderRows};
 
 void read_surroundings(TableReader& root, SceneReading& reading) {
     const bool has_epoch = reading.has_epoch = read_scene_table(root, reading.scene);

@@ -12,8 +12,7 @@ namespace narpa {
 
 namespace {
 
-/// The tables of a scene file.
-const Key kSceneFileRows[]{
+constexpr Key kSceneFileRows[]{
     {"scene", rows::table(kSceneKeys)},
     {"sun", rows::table(kSunKeys)},
     {"ambient", rows::table()},
@@ -27,7 +26,6 @@ const Key kSceneFileRows[]{
     {"atmosphere", rows::table()},
     {"sky", rows::table()},
 };
-const Keys kSceneFileKeys{.rows = kSceneFileRows};
 
 void read_root(TableReader& root, SceneReading& reading) {
     read_surroundings(root, reading);
@@ -72,6 +70,8 @@ Result<Scene> read_files(const std::string& path) {
 }
 
 }  // namespace
+
+constinit const Keys kSceneFileKeys{.rows = kSceneFileRows};
 
 Status use_method(Scene& scene, RenderSettings::Method method) {
     for (const Material& m : scene.materials)

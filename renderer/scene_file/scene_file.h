@@ -4,9 +4,13 @@
 #include <string>
 
 #include "base/result.h"
+#include "renderer/keys/keys.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
+
+/// The tables of a scene file.
+extern const Keys kSceneFileKeys;
 
 /// Reads a scene and everything it names; paths inside are relative to the scene file. The key reference is
 /// docs/scene.md. Errors carry file, line and column; a key that is not known is an error.

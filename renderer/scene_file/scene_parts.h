@@ -58,8 +58,6 @@ struct SceneReading {
 extern const Keys kSceneKeys, kSunKeys, kRenderKeys, kObserverKeys, kLidarKeys;
 extern const Keys kOrbitKeys;     ///< of `orbit` of a body
 extern const Keys kTrackingKeys;  ///< of cameras at the observer: a part of their Keys
-/// The tables of a scene file.
-extern const Keys kSceneFileKeys;
 /// [scene], [sun], [ambient], [render].
 void read_surroundings(TableReader& root, SceneReading& reading);
 /// [stars], with its catalogue. `epoch_year`: that of [scene], if it has one.

@@ -1,0 +1,284 @@
+"""The JSON schemas that `narpa check --schema` prints: shipped files are valid, the key tables of the documents state the same
+keys, ranges and choices, and broken files are refused by the schema and by `narpa check` alike.
+
+Usage: schema.py NARPA SOURCE_DIR"""
+import datetime
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import jsonschema
+    import tomllib
+except ImportError as missing:
+    print(f"SKIP: {missing} (scripts/setup test)")
+    sys.exit(77)
+
+NARPA, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
+
+
+def schema(kind):
+    said = subprocess.run([NARPA, "check", "--schema", kind], capture_output=True, text=True, check=True)
+    return json.loads(said.stdout)
+
+
+SCHEMAS = {kind: schema(kind) for kind in ("scene", "lidar")}
+
+
+def errors(kind, document):
+    return [e.message for e in jsonschema.Draft202012Validator(SCHEMAS[kind]).iter_errors(document)]
+
+
+def plain(value):
+    """Dates as texts, as editors see them."""
+    if isinstance(value, dict):
+        return {key: plain(v) for key, v in value.items()}
+    if isinstance(value, list):
+        return [plain(v) for v in value]
+    return value.isoformat() if isinstance(value, (datetime.date, datetime.datetime)) else value
+
+
+def merged(path, head):
+    """The file, with what it takes from the file that it is based on."""
+    own = plain(tomllib.loads(path.read_text()))
+
+    def fill(over, under):
+        for key, value in under.items():
+            if isinstance(value, dict) and isinstance(over.get(key), dict):
+                fill(over[key], value)
+            else:
+                over.setdefault(key, value)
+
+    if base := own.get(head, {}).get("based_on"):
+        fill(own, merged(path.parent / base, head))
+    return own
+
+
+def kind_of(document):
+    if isinstance(document.get("lidar"), dict):
+        return "lidar"
+    return "scenario" if "scenario" in document else "scene"
+
+
+# --- The documents ---
+
+NUMBER = r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+# Cells with more than one interval, for kinds or makes, or with one that depends on other keys.
+FREE = {"scene/lidar/model", "scene/lidar/rate_hz", "scene/lidar/range_min_m", "scene/lidar/range_max_m",
+        "scene/lidar/returns", "scene/lidar/sub_rays", "scene/lidar/columns", "scene/render/seed",
+        "lidar/lidar/rate_hz_min", "lidar/lidar/rate_hz_max", "lidar/lidar/range_resolution_m",
+        "lidar/lidar/velocity_resolution_m_s", "lidar/lidar/name", "lidar/grid/fov_horizontal_deg",
+        "lidar/grid/fov_vertical_deg", "scene/observer/height_m"}
+# Keys of sections that share a table, described by a table of their own.
+SHARED = {"name", "mount", "position_m", "attitude_wxyz", "look_at", "up"}
+
+
+def interval(text):
+    """(low, low is open, high, high is open) of "0 to < 180", "> 0", "+-5", "(0, 1]"; None: it is none."""
+    text = text.strip()
+    if m := re.fullmatch(rf"(>=?)\s*({NUMBER})(?: to (<?)\s*({NUMBER}))?", text):
+        return float(m[2]), m[1] == ">", float(m[4]) if m[4] else math.inf, m[3] == "<"
+    if m := re.fullmatch(rf"({NUMBER}) to (<?)\s*({NUMBER})", text):
+        return float(m[1]), False, float(m[3]), m[2] == "<"
+    if m := re.fullmatch(rf"\+-({NUMBER})", text):
+        return -float(m[1]), False, float(m[1]), False
+    if m := re.fullmatch(rf"([(\[])({NUMBER}), ({NUMBER})([)\]])", text):
+        return float(m[2]), m[1] == "(", float(m[3]), m[4] == ")"
+    return None
+
+
+def interval_of(value):
+    """The same of a schema, of its items where it is an array."""
+    for part in [value, value.get("items", {}), *value.get("anyOf", [])]:
+        if part.get("type") in ("number", "integer") and part.keys() & {"minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum"}:
+            return (part.get("minimum", part.get("exclusiveMinimum", -math.inf)), "exclusiveMinimum" in part,
+                    part.get("maximum", part.get("exclusiveMaximum", math.inf)), "exclusiveMaximum" in part)
+    return None
+
+
+def choices_of(value):
+    return value.get("enum") or next((part["enum"] for part in value.get("anyOf", []) if "enum" in part), None)
+
+
+def agree(documented, own):
+    """`> 0` in a document stands for limits that no use reaches, too."""
+    if own is None or documented is None:
+        return own is documented
+    no_limit = documented[2] == math.inf and own[2] >= 1e9
+    return documented[:2] == own[:2] and (no_limit or documented[2:] == own[2:])
+
+
+def documented_rows(file):
+    """(section, keys, cells by heading) of each row of a key table."""
+    section, heads, rows = "", [], []
+    for line in file.read_text().splitlines():
+        if m := re.match(r"## \[+([\w.]+)\]", line):
+            section = m[1]
+        elif line.startswith("## "):
+            section = ""
+        cells = [c.strip() for c in line.strip("|").split("|")]
+        if not line.startswith("|"):
+            heads = []
+        elif not heads:
+            heads = cells
+        elif section and heads[0] == "key" and (keys := re.findall(r"`(\w+)`", cells[0])):
+            rows.append((section, keys, dict(zip(heads, cells))))
+    return rows
+
+
+class Documents(unittest.TestCase):
+    def compare(self, kind, file):
+        documented = {}
+        for section, keys, cells in documented_rows(SOURCE / "docs" / file):
+            table = SCHEMAS[kind]["properties"].get(section)
+            self.assertIsNotNone(table, f"[{section}] of {file} has no rows")
+            table = table.get("items", table)
+            if "properties" not in table:
+                continue
+            ranges = re.split(r",(?![^(\[]*[)\]])", cells.get("range", ""))
+            for i, key in enumerate(keys):
+                documented.setdefault(section, set()).add(key)
+                value = table["properties"].get(key)
+                with self.subTest(file=file, table=section, key=key):
+                    self.assertIsNotNone(value, "the document has a key without a row")
+                    if f"{kind}/{section}/{key}" in FREE or "range" not in cells:
+                        continue
+                    if choices := choices_of(value):
+                        self.assertEqual(sorted(choices), sorted(re.findall(r'"([^"]+)"', cells["range"])))
+                    elif value.get("type") != "boolean":
+                        text = ranges[i] if len(ranges) == len(keys) else cells["range"].split(";")[0]
+                        own = interval_of(value)
+                        self.assertTrue(agree(interval(text), own), f"the document says {text!r}, the row {own}")
+        for section, keys in documented.items():
+            table = SCHEMAS[kind]["properties"][section]
+            rows = set(table.get("items", table)["properties"]) - keys
+            self.assertFalse(rows - SHARED, f"[{section}]: rows that {file} lacks")
+
+    def test_scene(self):
+        self.compare("scene", "scene.md")
+
+    def test_lidar(self):
+        self.compare("lidar", "lidar-description.md")
+
+
+class Shipped(unittest.TestCase):
+    def test_every_file_is_valid(self):
+        counts = {}
+        for path in sorted((SOURCE / "scenes").rglob("*.toml")):
+            kind = kind_of(tomllib.loads(path.read_text()))
+            if kind not in SCHEMAS:
+                continue
+            counts[kind] = counts.get(kind, 0) + 1
+            with self.subTest(file=str(path)):
+                self.assertEqual(errors(kind, merged(path, kind)), [])
+        for kind in SCHEMAS:
+            self.assertGreater(counts.get(kind, 0), 0, kind)
+
+
+# --- Broken files ---
+
+GOOD = """
+[scene]
+name = "s"
+epoch = "2026-03-01T12:00:00Z"
+[sun]
+direction = [1.0, 0.0, 0.0]
+irradiance_w_m2 = 1361
+angular_diameter_deg = 0.5
+[render]
+method = "path"
+max_depth = 3
+spp = 2
+seed = 1
+stale_after_s = 0.5
+command_ahead_max_s = 60
+[observer]
+latitude_deg = 50
+longitude_deg = 8
+height_m = 100
+ut1_utc_s = 0.1
+temperature_c = 10
+pressure_hpa = 1010
+refraction = true
+sees = ["ball"]
+sun = true
+[[body]]
+name = "ball"
+position_m = [0.0, 30.0, 0.0]
+sphere = {radius_m = 1.0}
+[[lidar]]
+name = "l"
+model = "VLP-16"
+position_m = [0.0, 0.0, 0.0]
+attitude_wxyz = [1.0, 0.0, 0.0, 0.0]
+rate_hz = 10
+pps = "locked"
+returns = "last"
+range_max_m = 100
+beam_divergence_rad = 0.003
+sub_rays = 8
+multipath = "none"
+range_at_10_percent_m = 50
+range_noise_m = 0.01
+"""
+
+# (line of GOOD, what replaces it)
+BROKEN = [
+    ('name = "s"', "name = 7"), ('name = "s"', 'names = "s"'), ('epoch = "2026-03-01T12:00:00Z"', "epoch = 2026"),
+    ('epoch = "2026-03-01T12:00:00Z"', 'epok = "2026-03-01T12:00:00Z"'),
+    ("direction = [1.0, 0.0, 0.0]", "direction = [1.0, 0.0]"), ("direction = [1.0, 0.0, 0.0]", 'direction = "x"'),
+    ("direction = [1.0, 0.0, 0.0]", "direction = [1.0, 0.0, true]"),
+    ("irradiance_w_m2 = 1361", "irradiance_w_m2 = 0"), ("irradiance_w_m2 = 1361", "irradiance = 1361"),
+    ("irradiance_w_m2 = 1361", 'irradiance_w_m2 = "bright"'), ("angular_diameter_deg = 0.5", "angular_diameter_deg = 180"),
+    ("angular_diameter_deg = 0.5", "angular_diameter_deg = -0.1"), ('method = "path"', 'method = "guess"'),
+    ('method = "path"', "method = 1"), ("max_depth = 3", "max_depth = 41"), ("max_depth = 3", "max_depth = 2.5"),
+    ("max_depth = 3", "depth = 3"), ("spp = 2", "spp = 0"), ("spp = 2", "spp = 65536"), ("spp = 2", "spp = true"),
+    ("seed = 1", "seed = -1"), ("stale_after_s = 0.5", "stale_after_s = 0"),
+    ("command_ahead_max_s = 60", "command_ahead_max_s = 140001"), ("latitude_deg = 50", "latitude_deg = 91"),
+    ("latitude_deg = 50", ""), ("longitude_deg = 8", ""), ("longitude_deg = 8", "longitude_deg = -361"),
+    ("height_m = 100", "height_m = 20001"), ("ut1_utc_s = 0.1", "ut1_utc_s = 1"),
+    ("temperature_c = 10", "temperature_c = 283"), ("temperature_c = 10", "temperature_k = 283"),
+    ("pressure_hpa = 1010", "pressure_hpa = 101325"), ("refraction = true", "refraction = 1"),
+    ('sees = ["ball"]', 'sees = "ball"'), ('sees = ["ball"]', "sees = [1]"), ("sun = true", 'sun = "yes"'),
+    ('name = "l"', ""), ('model = "VLP-16"', ""), ('model = "VLP-16"', 'model = "VLP-17"'),
+    ('model = "VLP-16"', "model = 16"), ("position_m = [0.0, 0.0, 0.0]", "position_m = [0.0, 0.0]"),
+    ("attitude_wxyz = [1.0, 0.0, 0.0, 0.0]", "attitude_wxyz = [1.0, 0.0, 0.0]"),
+    ("attitude_wxyz = [1.0, 0.0, 0.0, 0.0]", "attitude_wxyz = [2.0, 0.0, 0.0, 0.0]"), ("rate_hz = 10", "rate_hz = 0"),
+    ('pps = "locked"', 'pps = "maybe"'), ('returns = "last"', 'returns = "first"'),
+    ("range_max_m = 100", "range_max_m = -1"), ("beam_divergence_rad = 0.003", "beam_divergence_rad = 0.2"),
+    ("beam_divergence_rad = 0.003", "divergence_rad = 0.003"), ("sub_rays = 8", "sub_rays = 65"),
+    ("sub_rays = 8", "sub_rays = 8.5"), ('multipath = "none"', 'multipath = "some"'),
+    ("range_at_10_percent_m = 50", "range_at_10_percent_m = 0"), ("range_noise_m = 0.01", "range_noise_m = -0.01"),
+    ("range_noise_m = 0.01", "range_noise_m = [0.01]"), ("[sun]", "[suns]"), ("[render]", "[renderer]"),
+]
+
+
+class Broken(unittest.TestCase):
+    def accepted_by_narpa(self, text):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "scene.toml"
+            path.write_text(text)
+            said = subprocess.run([NARPA, "check", str(path)], capture_output=True, text=True)
+            self.assertIn(said.returncode, (0, 2), said.stderr)
+            return said.returncode == 0, said.stderr
+
+    def test_the_unbroken_scene_is_accepted_by_both(self):
+        self.assertEqual(errors("scene", tomllib.loads(GOOD)), [])
+        self.assertEqual(self.accepted_by_narpa(GOOD)[0], True, self.accepted_by_narpa(GOOD)[1])
+
+    def test_each_broken_scene_is_refused_by_both(self):
+        self.assertGreaterEqual(len(BROKEN), 50)
+        for line, wrong in BROKEN:
+            with self.subTest(line=line, wrong=wrong):
+                self.assertEqual(GOOD.count(f"\n{line}\n"), 1)
+                text = GOOD.replace(f"\n{line}\n", f"\n{wrong}\n")
+                self.assertNotEqual(errors("scene", tomllib.loads(text)), [])
+                self.assertEqual(self.accepted_by_narpa(text)[0], False)
+
+
+unittest.main(argv=sys.argv[:1])

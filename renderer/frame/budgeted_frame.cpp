@@ -8,7 +8,7 @@
 namespace narpa {
 namespace {
 
-using Kind = FrameBudget::Kind;
+using BudgetKind = FrameBudget::Kind;
 using Of = PassCosts::Of;
 using Stage = SamplePlan::Stage;
 using Tiles = FramePasses::Tiles;
@@ -89,8 +89,8 @@ private:
     }
     [[nodiscard]] PassLimit limit() const {
         PassLimit l;
-        if (budget_.kind == Kind::rays) l.rays = rays_left();
-        if (budget_.kind == Kind::time) l.until_ns = now_ns() + ns_left();
+        if (budget_.kind == BudgetKind::rays) l.rays = rays_left();
+        if (budget_.kind == BudgetKind::time) l.until_ns = now_ns() + ns_left();
         return l;
     }
 
@@ -99,7 +99,7 @@ private:
     bool account_for(const PassCount& pass, const PassLimit& l, bool instead) {
         if (!pass.complete) {
             // Deterministic: the point at which the threads gave up must not decide what comes next.
-            const std::uint64_t lost = budget_.kind == Kind::rays ? l.rays : pass.rays;
+            const std::uint64_t lost = budget_.kind == BudgetKind::rays ? l.rays : pass.rays;
             rays_ += lost;
             account_.rays_discarded += lost;
             return false;
@@ -154,10 +154,10 @@ private:
     [[nodiscard]] bool worth_sunlight() const {
         const auto pixels = static_cast<double>(passes_.pixels());
         switch (budget_.kind) {
-            case Kind::samples: return false;
-            case Kind::passes: return budget_.passes[kSunlightPass] > 0;
-            case Kind::rays: return static_cast<double>(budget_.rays) >= kMinRaysForSunlight * pixels;
-            case Kind::time:
+            case BudgetKind::samples: return false;
+            case BudgetKind::passes: return budget_.passes[kSunlightPass] > 0;
+            case BudgetKind::rays: return static_cast<double>(budget_.rays) >= kMinRaysForSunlight * pixels;
+            case BudgetKind::time:
                 return costs_.known(Of::samples) && worth_planning() &&
                        static_cast<double>(costs_.fitting(Of::samples, ns_left())) >=
                            kMinSamplesForSunlight * pixels;
@@ -176,11 +176,11 @@ private:
     [[nodiscard]] bool two_samples_fit() const {
         const auto pixels = static_cast<double>(passes_.pixels());
         switch (budget_.kind) {
-            case Kind::rays:
+            case BudgetKind::rays:
                 return (rays_each_.sample + rays_each_.path) * pixels <
                        kFirstPassRays *
                            (static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays)));
-            case Kind::time:
+            case BudgetKind::time:
                 return static_cast<double>(costs_.fitting(Of::samples, ns_for_samples())) * kFirstPassTime >=
                        pixels;
             default: return true;
@@ -189,12 +189,12 @@ private:
 
     void take_first_image() {
         switch (budget_.kind) {
-            case Kind::samples: break;
-            case Kind::passes: replay_first_image(); break;
-            case Kind::time:
+            case BudgetKind::samples: break;
+            case BudgetKind::passes: replay_first_image(); break;
+            case BudgetKind::time:
                 if (!take_if_affordable(1)) from_coarse_to_fine();
                 break;
-            case Kind::rays:
+            case BudgetKind::rays:
                 if (adaptive_ && 2 * passes_.pixels() <= rays_left())  // the camera's and the Sun's
                     take_one_sample(limit());
                 else if (adaptive_ || !take_pilot_and_rest())
@@ -244,7 +244,7 @@ private:
     }
 
     void from_coarse_to_fine() {
-        const bool timed = budget_.kind == Kind::time;
+        const bool timed = budget_.kind == BudgetKind::time;
         if (!timed || !take_if_affordable(2)) {
             // A complete coarse frame is taken even if it is late.
             if (!take_centres(4, 0, FrameStep::coarse_4, timed ? PassLimit{} : limit())) return;
@@ -274,7 +274,8 @@ private:
         for (std::size_t i = 0; i < passes; ++i) {
             const Stage next = sunlight_planned_ ? SamplePlan::whole(wanted(i)) : wanted(i);
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
-            if (samples == 0 && i == 0 && budget_.kind == Kind::time && worth_a_pass()) costs_.decay(Of::samples);
+            if (samples == 0 && i == 0 && budget_.kind == BudgetKind::time && worth_a_pass())
+                costs_.decay(Of::samples);
             if (samples == 0) break;
             if (to_show_ == ToShow::means) show();  // an abandoned pass invalidates the means
             const PassLimit l = limit();
@@ -306,8 +307,8 @@ private:
         to_show_ = ToShow::means;
     }
     [[nodiscard]] double sunlight_samples() const {
-        if (budget_.kind == Kind::passes) return budget_.passes[kSunlightPass];
-        if (budget_.kind == Kind::rays)
+        if (budget_.kind == BudgetKind::passes) return budget_.passes[kSunlightPass];
+        if (budget_.kind == BudgetKind::rays)
             return std::min(static_cast<double>(rays_left()) / kMaxRaysOfSunlight, kMaxSamples);
         return std::min(kSunlightPassTime * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())),
                         kMaxSamples);
@@ -325,9 +326,9 @@ private:
     /// Target stage of the next pass; equal to the present one if there is none.
     [[nodiscard]] Stage wanted(std::size_t pass) const {
         const SamplePlan& plan = passes_.plan();
-        if (budget_.kind == Kind::passes)
+        if (budget_.kind == BudgetKind::passes)
             return recorded_step() == FrameStep::refined ? plan.reach(stage_, budget_.passes[pass]) : stage_;
-        if (budget_.kind == Kind::rays) {
+        if (budget_.kind == BudgetKind::rays) {
             const double left = static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays));
             if (left < kMinRemainder * static_cast<double>(budget_.rays)) return stage_;
             const double part = adaptive_ ? kNextPassRays : pass == 0 ? kFirstPassRays : kNextPassRaysOfPaths;
@@ -351,7 +352,7 @@ private:
 
     /// Planning cannot be interrupted, so it is begun only if time is left for samples.
     [[nodiscard]] bool worth_planning() const {
-        if (budget_.kind != Kind::time) return true;
+        if (budget_.kind != BudgetKind::time) return true;
         const auto rest = static_cast<std::int64_t>(2 * kMinRemainder * static_cast<double>(time_given()));
         return costs_.expected_ns(Of::plan, passes_.pixels()) + rest <= ns_left();
     }

@@ -230,7 +230,7 @@ TEST(BudgetError, FramesThatTheClockEndsHaveTheMeanOfTheReference) {
     Bias bias;
     for (std::uint32_t k = 0; k < 60; ++k) {
         FrameSettings s = rays_a_pixel(v, 0, k, Method::path);
-        s.budget.kind = Kind::time;
+        s.budget.kind = BudgetKind::time;
         s.budget.deadline_ns = now_ns() + two_ns * (100 + 8 * std::int64_t{k}) / 100;  // 1 to 5.7 times
         const Shown shown = render(renderer, v, s);
         if (shown.account.step <= FrameStep::one_sample) bias.add(misses_of(shown.image, truth).mean);

@@ -194,7 +194,7 @@ TEST(BudgetFrame, ADeadlineThatIsPastLeavesTimeForAWholeCoarseImage) {
         const Shown coarse = at_step(v, FrameStep::coarse_4, method, 1);
         for (const std::int64_t late_ns : {std::int64_t{0}, std::int64_t{1'000'000}, now_ns()}) {
             FrameSettings s = rays_a_pixel(v, 0, 1, method);
-            s.budget.kind = Kind::time;
+            s.budget.kind = BudgetKind::time;
             s.budget.deadline_ns = now_ns() - late_ns;
             const Shown shown = render(renderer, v, s);
             EXPECT_EQ(shown.account.step, FrameStep::coarse_4);
@@ -210,7 +210,7 @@ TEST(BudgetFrame, WhatTheClockCutsOffLeavesNoTrace) {
     for (const Method method : {Method::direct, Method::path})
         for (int run = 0; run < 25; ++run) {
             FrameSettings s = rays_a_pixel(v, 0, static_cast<std::uint32_t>(++frame), method);
-            s.budget.kind = Kind::time;
+            s.budget.kind = BudgetKind::time;
             s.budget.deadline_ns = now_ns() + 300'000 + 200'000 * run;
             const Shown shown = render(renderer, v, s);
             cut += shown.account.rays_discarded > 0;
@@ -273,7 +273,7 @@ TEST(BudgetFrame, HasSamplesOfSunlightAloneWhereTimeAllowsAndIsMadeAnewWithThem)
     // A busy machine may leave too little time: more each time.
     for (std::uint32_t frame = 0; frame < 12 && !any; ++frame) {
         FrameSettings s = rays_a_pixel(v, 0, frame, Method::path);
-        s.budget.kind = Kind::time;
+        s.budget.kind = BudgetKind::time;
         s.budget.deadline_ns = now_ns() + 8 * two_ns * (1 + std::int64_t{frame});
         const Shown shown = render(renderer, v, s);
         any = shown.account.passes[kSunlightPass] > 0;

@@ -15,7 +15,7 @@
 
 namespace narpa::test {
 
-using Kind = FrameBudget::Kind;
+using BudgetKind = FrameBudget::Kind;
 
 /// A scene before a camera, small enough to be rendered thousands of times.
 class BudgetView {
@@ -65,7 +65,7 @@ inline FrameSettings rays_a_pixel(const BudgetView& v, double rays, std::uint32_
     s.frame = frame;
     s.method = method;
     s.max_depth = 4;
-    s.budget.kind = Kind::rays;
+    s.budget.kind = BudgetKind::rays;
     s.budget.rays = static_cast<std::uint64_t>(rays * static_cast<double>(v.pixels()));
     return s;
 }
@@ -79,7 +79,7 @@ inline FrameSettings samples_a_pixel(const BudgetView& v, int spp, std::uint32_t
 /// Settings that make a frame again from its account.
 inline FrameSettings replay_of(FrameSettings s, const FrameAccount& account) {
     s.budget = {};
-    s.budget.kind = Kind::passes;
+    s.budget.kind = BudgetKind::passes;
     s.budget.passes = account.passes;
     s.budget.step = static_cast<std::uint8_t>(account.step);
     return s;

@@ -14,7 +14,7 @@ namespace narpa {
 namespace {
 
 using namespace test;
-using Kind = MapQuantity::Kind;
+using QuantityKind = MapQuantity::Kind;
 
 /// A scene, seen by a camera at the world's origin that looks along z.
 struct Sight {
@@ -63,7 +63,7 @@ TEST(SurfaceMap, DepthLinesOfATiltedPlaneAreWhereTheyBelong) {
     const Vec3 n = tilted().q * Vec3{0, 0, 1};
     const double d = dot(n, tilted().t);
     double worst = 0;
-    const auto lines = sight.contours({Kind::depth}, levels);
+    const auto lines = sight.contours({QuantityKind::depth}, levels);
     for (const ContourLine& line : lines)
         for (const ImagePoint& p : line.points) {
             // n . (x, y, f) / f = d / level: a straight line of the image.
@@ -101,7 +101,7 @@ TEST(SurfaceMap, HeightLinesAreInTheFrameOfTheBody) {
     const int body = add_mesh(s, plate(100, 100), tilted());
     add_mesh(s, plate(2, 2), {{}, {0, 0, 10}});  // before it: not part of the map
     const Sight sight(std::move(s), camera(320, 240, 500));
-    const MapQuantity q{Kind::height, body, normalized(Vec3{1, 2, 0}), 0.75};
+    const MapQuantity q{QuantityKind::height, body, normalized(Vec3{1, 2, 0}), 0.75};
     std::vector<double> levels{-2, -1, 0, 1, 2};
     SurfaceMap map;
     const auto lines = sight.contours(q, levels, &map);
@@ -134,7 +134,7 @@ TEST(SurfaceMap, DepthLinesOfASphereAreCircles) {
     add_sphere(s, 2, {0, 0, 10});
     const Sight sight(std::move(s), camera(301, 301, 600));
     const std::vector<double> levels{8.01, 8.05, 8.2, 8.5, 9, 9.2};
-    const auto lines = sight.contours({Kind::depth}, levels);
+    const auto lines = sight.contours({QuantityKind::depth}, levels);
     ASSERT_EQ(lines.size(), levels.size());
     const double limb = pinhole_of(sight.c).fx * std::tan(std::asin(2.0 / 10));
     for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -157,7 +157,7 @@ TEST(SurfaceMap, RadiusOfASphereIsConstant) {
     const int body = add_sphere(s, 2, {0.5, -0.25, 10});
     const Sight sight(std::move(s), camera(64, 64, 120));
     SurfaceMap map;
-    EXPECT_TRUE(sight.contours({Kind::radius, body}, std::array{2.0}, &map).empty());
+    EXPECT_TRUE(sight.contours({QuantityKind::radius, body}, std::array{2.0}, &map).empty());
     int seen = 0;
     for (const double v : map.quantity.values) {
         if (std::isnan(v)) continue;
@@ -200,7 +200,7 @@ TEST(SurfaceMap, NoLineCrossesTheOutlineOfWhatIsBefore) {
     std::vector<double> levels;
     for (int k = -20; k <= 20; ++k) levels.push_back(0.25 * k);
     SurfaceMap map;
-    const auto lines = sight.contours({Kind::height, -1, {0, 1, 0}}, levels, &map);
+    const auto lines = sight.contours({QuantityKind::height, -1, {0, 1, 0}}, levels, &map);
     const auto direction = [&](const ImagePoint& p) {
         return normalized(Vec3{(p.x - pinhole_of(sight.c).cx) / pinhole_of(sight.c).fx,
                                (p.y - pinhole_of(sight.c).cy) / pinhole_of(sight.c).fy, 1});
@@ -269,7 +269,7 @@ TEST(SurfaceMap, PixelsBeyondTheImageCircleHaveNoSurface) {
     Camera c = camera(101, 101, 60);
     c.model = brown_conrady(pinhole_of(c), {-0.35, 0, 0, 0});
     const Sight sight(std::move(s), c);
-    const SurfaceMap map = sight.mapper({Kind::range}).map();
+    const SurfaceMap map = sight.mapper({QuantityKind::range}).map();
     int unseen = 0;
     for (std::size_t i = 0; i < map.quantity.values.size(); ++i) {
         const bool sees = c.model->sees(sight.pixel(i));

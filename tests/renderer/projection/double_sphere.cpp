@@ -9,7 +9,7 @@
 
 #include "base/constants.h"
 
-namespace narpa {
+namespace narpa::double_sphere {
 namespace {
 
 struct Parameters {
@@ -156,4 +156,4 @@ TEST(DoubleSphere, IsValidForItsParametersOnly) {
 }
 
 }  // namespace
-}  // namespace narpa
+}  // namespace narpa::double_sphere

@@ -175,7 +175,8 @@ TEST(StereoMatcher, MatchesThroughLensesThatDistort) {
         EXPECT_LT(ratio, 2);  // resampling correlates the noise of neighbours, which the covariance does not know
         EXPECT_GT(ratio, 0.25);
     }
-    for (Camera* c : {&v.pair.left, &v.pair.right}) c->model = nullptr;
+    for (Camera* c : {&v.pair.left, &v.pair.right})
+        c->model = std::make_shared<const Pinhole>(test::pinhole_of(*c));
     const auto ignored = match_stereo(v.pair, v.left, v.right, settings());
     ASSERT_TRUE(ignored);
     EXPECT_LT(ignored->points.size(), found->points.size() / 2);

@@ -96,6 +96,8 @@ void refuse_keys_of_other_kinds(TableReader& table, const BsdfKind& kind) {
         return keys;
     }();
     table.refuse_keys_of_other_kinds(kind.name, all);
+    for (const KindKeys& keys : all)
+        for (const std::string_view key : keys.keys) (void)table.has(key);  // suggested for misspelt keys, too
 }
 
 /// Reads everything but the kind.

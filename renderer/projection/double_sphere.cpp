@@ -37,9 +37,8 @@ NARPA_EACH_ISA void directions_of(const Pinhole& pinhole, double xi, double alph
     out = direction;
 }
 
-/// Cosine of the angle from the axis at which the image ends. On the second sphere it ends at the cosine -w: for
-/// alpha
-/// <= 1/2 the denominator is 0 there, for larger alpha the radius has its maximum.
+/// Cosine of the angle from the axis at which the image ends. On the second sphere it ends at the cosine -w: where
+/// alpha is at most 1/2, the denominator is 0 there; where it is larger, the radius has its maximum.
 double cos_at_rim(double xi, double alpha) noexcept {
     const double w = alpha <= 0.5 ? alpha / (1 - alpha) : (1 - alpha) / alpha;
     return -xi * (1 - w * w) - w * std::sqrt(1 - xi * xi * (1 - w * w));

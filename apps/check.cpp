@@ -490,7 +490,7 @@ const std::array<SchemaRow, 2> kSchemas{{{"scene", kSceneFileKeys}, {"lidar", kL
 Outcome print_schema(const std::string& name) {
     const auto row = std::ranges::find(kSchemas, name, &SchemaRow::name);
     fmt::print("{}", json_schema(row->keys, fmt::format("narpa {}", name)));
-    return nlohmann::json::object();
+    return nlohmann::json();  // the schema is the one document
 }
 
 Outcome check(const CheckOptions& o) {

@@ -102,7 +102,7 @@ int finish(const Outcome& outcome, bool json) {
         if (json) print_json(to_json(outcome.error()));
         return exit_status(outcome.error().kind);
     }
-    if (json && !print_json(*outcome)) return exit_status(ErrorKind::failed);
+    if (json && !outcome->is_null() && !print_json(*outcome)) return exit_status(ErrorKind::failed);
     if (outcome->contains("error")) return (*outcome)["error"]["exit_status"];
     return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
 }

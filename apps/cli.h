@@ -16,8 +16,9 @@
 
 namespace narpa::cli {
 
-/// The result of a subcommand, for --json, or an Error. The document of a check that can fail has `passed`; false
-/// gives exit status 1. A document with results of a command that failed later also has `error` (to_json).
+/// The result of a subcommand, for --json, or an Error. Null: standard output has its document already. The
+/// document of a check that can fail has `passed`; false gives exit status 1. A document with results of a command
+/// that failed later also has `error` (to_json).
 using Outcome = Result<nlohmann::json>;
 using Command = std::function<Outcome()>;
 

@@ -131,6 +131,12 @@ def documented_rows(file):
     return rows
 
 
+class Output(unittest.TestCase):
+    def test_json_is_one_document(self):
+        said = subprocess.run([NARPA, "check", "--schema", "scene", "--json"], capture_output=True, text=True, check=True)
+        self.assertEqual(json.loads(said.stdout), SCHEMAS["scene"])
+
+
 class Documents(unittest.TestCase):
     def compare(self, kind, file):
         documented = {}

@@ -50,7 +50,7 @@ public:
         int renders = 0;
         if (features_) {
             const auto from = features_->estimate(f);
-            if (!from) return from;
+            if (!from) return from.error();
             renders = from->renders;
             if (from->answer.usable()) start = from->T_camera_target, o.coarsest = 1;
         }

@@ -57,7 +57,7 @@ std::string message_name(std::uint32_t id, std::span<const CanBody> bodies) {
             return std::string(kPoseLayout.title) + " of " + body.name + part;
     for (const SetLayout* m : kMessages) {
         if (m->instances == Instances::per_body || !owns(*m, id)) continue;
-        const std::string title(m->title);
+        std::string title(m->title);
         if (m->fd_counter_bit == 0) return title;
         return title + (m->instances == Instances::one ? "" : " of camera " + std::to_string(*ledger_camera(id))) +
                part;

@@ -92,7 +92,7 @@ TEST(BenchRender, TheAblationSwitchesOffEachMechanism) {
         ++off;
     }
     EXPECT_EQ(full, 3U);
-    EXPECT_EQ(off, 7U);
+    EXPECT_EQ(off, 6U);
 }
 
 TEST(BenchRender, TheLadderMeasuresTheCraftBesideEmbreeAndThePlainLoop) {

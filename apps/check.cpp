@@ -483,7 +483,7 @@ nlohmann::json describe(const rehearsal::Scenario& s) {
 /// Kinds of files that have a schema.
 struct SchemaRow {
     std::string name;
-    const Keys& keys;
+    const TableKeys& keys;
 };
 const std::array<SchemaRow, 2> kSchemas{{{"scene", kSceneFileKeys}, {"lidar", kLidarDescriptionKeys}}};
 

@@ -377,7 +377,7 @@ std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problem
         s.seed = static_cast<std::uint64_t>(*seed);
     table->require("scene", "the scene file");
     const auto scene = table->text("scene");
-    const Place place = table->place("scene");
+    const FilePlace place = table->place("scene");
     table->finish();
     if (!scene) return std::nullopt;
     s.scene = beside(place.file, *scene);

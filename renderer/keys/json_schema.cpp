@@ -8,7 +8,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json table_schema(const Keys& keys);
+Json table_schema(const TableKeys& keys);
 
 Json number_schema(const Range& range) {
     Json out{{"type", "number"}};
@@ -18,7 +18,7 @@ Json number_schema(const Range& range) {
 }
 
 /// An array of the allowed counts.
-Json array_schema(const Json& items, const Value& value) {
+Json array_schema(const Json& items, const KeyValue& value) {
     if (value.counts[0] == 0)
         return {{"type", "array"}, {"items", items}, {"minItems", value.count_min}, {"maxItems", value.count_max}};
     Json lengths = Json::array();
@@ -32,9 +32,9 @@ Json array_schema(const Json& items, const Value& value) {
     return out;
 }
 
-Json value_schema(const Value& value, const Keys& keys) {
-    using enum Value::Type;
-    const Json integers{{"type", "integer"}, {"minimum", value.low}, {"maximum", value.high}};
+Json value_schema(const KeyValue& value, const TableKeys& keys) {
+    using enum KeyValue::Type;
+    Json integers{{"type", "integer"}, {"minimum", value.low}, {"maximum", value.high}};
     switch (value.type) {
         case number: return number_schema(value.range);
         case integer: return integers;
@@ -51,7 +51,7 @@ Json value_schema(const Value& value, const Keys& keys) {
         case choice: return {{"enum", value.words()}};
         case kind: {
             Json names = Json::array();
-            for (const Kind& k : keys.kinds()) names.push_back(k.name);
+            for (const TableKind& k : keys.kinds()) names.push_back(k.name);
             return {{"enum", names}};
         }
         case table: return value.keys ? table_schema(*value.keys) : Json{{"type", "object"}};
@@ -62,40 +62,41 @@ Json value_schema(const Value& value, const Keys& keys) {
     return Json::object();
 }
 
-Json key_schema(const Key& key, const Keys& keys) {
-    const Json schema = value_schema(key.value, keys);
-    if (!key.value.or_file || key.value.type == Value::Type::text) return schema;
-    const Json file = key.value.type == Value::Type::choice ? Json{{"type", "string"}, {"pattern", "\\.toml$"}}
-                                                            : Json{{"type", "string"}};
+Json key_schema(const TableKey& key, const TableKeys& keys) {
+    Json schema = value_schema(key.value, keys);
+    if (!key.value.or_file || key.value.type == KeyValue::Type::text) return schema;
+    const Json file = key.value.type == KeyValue::Type::choice ? Json{{"type", "string"}, {"pattern", "\\.toml$"}}
+                                                               : Json{{"type", "string"}};
     return {{"anyOf", {schema, file}}};
 }
 
 /// What holds for the tables of one kind: its keys, and none of the other kinds'.
-Json kind_schema(const Kind& kind, const std::vector<Kind>& kinds, const Keys& keys, const Key& kind_key) {
+Json kind_schema(const TableKind& kind, const std::vector<TableKind>& kinds, const TableKeys& keys,
+                 const TableKey& kind_key) {
     Json own = Json::object(), required = Json::array();
-    for (const Key& key : kind.rows) {
+    for (const TableKey& key : kind.rows) {
         own[std::string(key.name)] = key_schema(key, keys);
         if (!key.required.empty()) required.push_back(key.name);
     }
-    for (const Kind& other : kinds)
-        for (const Key& key : other.rows)
+    for (const TableKind& other : kinds)
+        for (const TableKey& key : other.rows)
             if (!own.contains(key.name)) own[std::string(key.name)] = false;
     Json is_kind{{"properties", {{kind_key.name, {{"const", kind.name}}}}}};
     if (kind.name != kind_key.value.otherwise) is_kind["required"] = Json::array({kind_key.name});
     return {{"if", is_kind}, {"then", {{"properties", own}, {"required", required}}}};
 }
 
-Json table_schema(const Keys& keys) {
+Json table_schema(const TableKeys& keys) {
     Json properties = Json::object(), required = Json::array(), kinds = Json::array();
-    for (const Key* key : keys.all_rows()) {
+    for (const TableKey* key : keys.all_rows()) {
         properties[std::string(key->name)] = key_schema(*key, keys);
         if (!key->required.empty()) required.push_back(key->name);
     }
-    const std::vector<Kind> all = keys.kinds ? keys.kinds() : std::vector<Kind>{};
-    for (const Kind& kind : all) {
-        for (const Key& key : kind.rows) properties.emplace(key.name, true);
-        for (const Key* key : keys.all_rows())
-            if (key->value.type == Value::Type::kind) kinds.push_back(kind_schema(kind, all, keys, *key));
+    const std::vector<TableKind> all = keys.kinds ? keys.kinds() : std::vector<TableKind>{};
+    for (const TableKind& kind : all) {
+        for (const TableKey& key : kind.rows) properties.emplace(key.name, true);
+        for (const TableKey* key : keys.all_rows())
+            if (key->value.type == KeyValue::Type::kind) kinds.push_back(kind_schema(kind, all, keys, *key));
     }
     Json out{{"type", "object"}, {"properties", properties}, {"additionalProperties", false}};
     if (!required.empty()) out["required"] = required;
@@ -105,7 +106,7 @@ Json table_schema(const Keys& keys) {
 
 }  // namespace
 
-std::string json_schema(const Keys& keys, std::string_view title) {
+std::string json_schema(const TableKeys& keys, std::string_view title) {
     Json schema{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", title}};
     schema.update(table_schema(keys));
     return schema.dump(1, ' ') + "\n";

@@ -11,6 +11,6 @@ namespace narpa {
 /// The schema (draft 2020-12) with this title of files with these keys: types, ranges, choices, required keys, and
 /// that keys without a row are errors. Rules between keys are not in it. A file that is `based_on` another has the
 /// keys of both.
-[[nodiscard]] std::string json_schema(const Keys& keys, std::string_view title);
+[[nodiscard]] std::string json_schema(const TableKeys& keys, std::string_view title);
 
 }  // namespace narpa

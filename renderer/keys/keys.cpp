@@ -21,28 +21,28 @@ std::string Range::words() const {
     return "a finite number";
 }
 
-bool Value::allows(std::size_t count) const {
+bool KeyValue::allows(std::size_t count) const {
     if (counts[0] == 0)
         return count >= static_cast<std::size_t>(count_min) && count <= static_cast<std::size_t>(count_max);
     return count > 0 && std::ranges::find(counts, static_cast<int>(count)) != counts.end();
 }
 
-const Key* Keys::find(std::string_view name, int kind) const {
-    if (const auto row = std::ranges::find(rows, name, &Key::name); row != rows.end()) return &*row;
-    for (const Keys* part : parts)
-        if (const Key* row = part ? part->find(name) : nullptr) return row;
-    const std::vector<Kind> all = kinds ? kinds() : std::vector<Kind>{};
+const TableKey* TableKeys::find(std::string_view name, int kind) const {
+    if (const auto row = std::ranges::find(rows, name, &TableKey::name); row != rows.end()) return &*row;
+    for (const TableKeys* part : parts)
+        if (const TableKey* row = part ? part->find(name) : nullptr) return row;
+    const std::vector<TableKind> all = kinds ? kinds() : std::vector<TableKind>{};
     for (std::size_t k = 0; k < all.size(); ++k)
         if (kind < 0 || kind == static_cast<int>(k))
-            if (const auto row = std::ranges::find(all[k].rows, name, &Key::name); row != all[k].rows.end())
+            if (const auto row = std::ranges::find(all[k].rows, name, &TableKey::name); row != all[k].rows.end())
                 return &*row;
     return nullptr;
 }
 
-std::vector<const Key*> Keys::all_rows() const {
-    std::vector<const Key*> all;
-    for (const Key& row : rows) all.push_back(&row);
-    for (const Keys* part : parts)
+std::vector<const TableKey*> TableKeys::all_rows() const {
+    std::vector<const TableKey*> all;
+    for (const TableKey& row : rows) all.push_back(&row);
+    for (const TableKeys* part : parts)
         if (part) std::ranges::copy(part->all_rows(), std::back_inserter(all));
     return all;
 }

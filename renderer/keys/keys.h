@@ -1,8 +1,8 @@
 /// renderer/keys/keys.h - what the tables of scene, scenario and LiDAR-description files may hold: one row for each
 /// key. Reading, its errors, the JSON schema and the tests of the documents follow from these rows.
 ///
-///     constexpr Key kSunRows[] = {{"irradiance_w_m2", rows::number(kPositive)}, ...};
-///     const Keys kSunKeys{.rows = kSunRows};
+///     constexpr TableKey kSunRows[] = {{"irradiance_w_m2", rows::number(kPositive)}, ...};
+///     const TableKeys kSunKeys{.rows = kSunRows};
 #pragma once
 
 #include <array>
@@ -29,10 +29,10 @@ inline constexpr Range kPositive{.low = 0, .low_open = true};
 inline constexpr Range kNotNegative{.low = 0};
 inline constexpr Range kUnit{.low = 0, .high = 1};
 
-struct Keys;
+struct TableKeys;
 
 /// What a key may hold: made by the functions in `rows`.
-struct Value {
+struct KeyValue {
     enum class Type : std::uint8_t {
         number,
         integer,
@@ -46,7 +46,7 @@ struct Value {
         size,       ///< two integers, [width, height]
         points,     ///< an array of `counts` arrays of three numbers
         choice,     ///< one of `words`
-        kind,       ///< one of the kinds of the table's Keys
+        kind,       ///< one of the kinds of the table's TableKeys
         date,       ///< a date or a date with its time, or a text with either
         table,
         tables,  ///< an array of tables
@@ -58,36 +58,36 @@ struct Value {
     int count_min = 0, count_max = 0;
     std::array<int, 4> counts{};  ///< the allowed ones; none: all from count_min to count_max
     std::vector<std::string_view> (*words)() = nullptr;
-    std::string_view otherwise{};  ///< the kind of a table that has no such key; empty: the key is required
-    const Keys* keys = nullptr;    ///< of the table or tables
+    std::string_view otherwise{};     ///< the kind of a table that has no such key; empty: the key is required
+    const TableKeys* keys = nullptr;  ///< of the table or tables
 
     /// Whether an array may have so many numbers or points.
     [[nodiscard]] bool allows(std::size_t count) const;
 };
 
-struct Key {
+struct TableKey {
     std::string_view name;
-    Value value;
+    KeyValue value;
     std::string_view
         required{};  ///< completes "[sun] has no "direction", expected ..."; empty: the key may be absent
 };
 
 /// The keys that a table has when its key of type `kind` holds this word, beside those of all kinds.
-struct Kind {
+struct TableKind {
     std::string_view name;
-    std::span<const Key> rows{};
+    std::span<const TableKey> rows{};
 };
 
 /// The keys of one table.
-struct Keys {
-    std::span<const Key> rows{};
-    std::array<const Keys*, 4> parts{};      ///< further keys of the same table; null: none
-    std::vector<Kind> (*kinds)() = nullptr;  ///< in the order of the concept's table
+struct TableKeys {
+    std::span<const TableKey> rows{};
+    std::array<const TableKeys*, 4> parts{};      ///< further keys of the same table; null: none
+    std::vector<TableKind> (*kinds)() = nullptr;  ///< in the order of the concept's table
 
     /// The row of a key of all kinds or of the kind with this index (-1: of any); null: it has none.
-    [[nodiscard]] const Key* find(std::string_view name, int kind = -1) const;
+    [[nodiscard]] const TableKey* find(std::string_view name, int kind = -1) const;
     /// The rows of all kinds, with those of the parts.
-    [[nodiscard]] std::vector<const Key*> all_rows() const;
+    [[nodiscard]] std::vector<const TableKey*> all_rows() const;
 };
 
 /// The first parts of pairs, or the elements: the words of a choice.
@@ -104,87 +104,87 @@ std::vector<std::string_view> words_of() {
 
 namespace rows {
 
-using Type = Value::Type;
+using Type = KeyValue::Type;
 
-constexpr Value number(const Range& range = kAnyNumber) {
+constexpr KeyValue number(const Range& range = kAnyNumber) {
     return {.type = Type::number, .range = range};
 }
-constexpr Value integer(std::int64_t low, std::int64_t high) {
+constexpr KeyValue integer(std::int64_t low, std::int64_t high) {
     return {.type = Type::integer, .low = low, .high = high};
 }
-constexpr Value boolean() {
+constexpr KeyValue boolean() {
     return {.type = Type::boolean};
 }
-constexpr Value text() {
+constexpr KeyValue text() {
     return {};
 }
 /// A text that names a file.
-constexpr Value file() {
+constexpr KeyValue file() {
     return {.or_file = true};
 }
-constexpr Value texts() {
+constexpr KeyValue texts() {
     return {.type = Type::texts};
 }
 /// An array of one of these counts.
-constexpr Value numbers(const std::array<int, 4>& counts, const Range& range = kAnyNumber) {
+constexpr KeyValue numbers(const std::array<int, 4>& counts, const Range& range = kAnyNumber) {
     return {.type = Type::numbers, .range = range, .counts = counts};
 }
 /// An array of 1 to `most` numbers.
-constexpr Value numbers_up_to(int most, const Range& range = kAnyNumber) {
+constexpr KeyValue numbers_up_to(int most, const Range& range = kAnyNumber) {
     return {.type = Type::numbers, .range = range, .count_min = 1, .count_max = most};
 }
-constexpr Value pair(const Range& range = kAnyNumber) {
+constexpr KeyValue pair(const Range& range = kAnyNumber) {
     return numbers({2}, range);
 }
-constexpr Value vec3(const Range& range = kAnyNumber) {
+constexpr KeyValue vec3(const Range& range = kAnyNumber) {
     return numbers({3}, range);
 }
-constexpr Value direction() {
+constexpr KeyValue direction() {
     return {.type = Type::direction, .counts = {3}};
 }
-constexpr Value attitude() {
+constexpr KeyValue attitude() {
     return {.type = Type::attitude, .range = {.low = -1.001, .high = 1.001}, .counts = {4}};
 }
-constexpr Value rgb(const Range& range) {
+constexpr KeyValue rgb(const Range& range) {
     return {.type = Type::rgb, .range = range, .counts = {3}};
 }
 /// [width, height], each in [1, high].
-constexpr Value size(int high) {
+constexpr KeyValue size(int high) {
     return {.type = Type::size, .low = 1, .high = high, .counts = {2}};
 }
 /// 1 to `most` points.
-constexpr Value points(int most) {
+constexpr KeyValue points(int most) {
     return {.type = Type::points, .count_min = 1, .count_max = most};
 }
 /// One of the words of an array, of names or of pairs that begin with names.
 template <const auto& names>
-constexpr Value choice() {
+constexpr KeyValue choice() {
     return {.type = Type::choice, .words = words_of<names>};
 }
-constexpr Value choice(std::vector<std::string_view> (*words)()) {
+constexpr KeyValue choice(std::vector<std::string_view> (*words)()) {
     return {.type = Type::choice, .words = words};
 }
-/// One of the kinds of the table's Keys; `otherwise` where the key is absent, unless it is required.
-constexpr Value kind(std::string_view otherwise = {}) {
+/// One of the kinds of the table's TableKeys; `otherwise` where the key is absent, unless it is required.
+constexpr KeyValue kind(std::string_view otherwise = {}) {
     return {.type = Type::kind, .otherwise = otherwise};
 }
-constexpr Value date() {
+constexpr KeyValue date() {
     return {.type = Type::date};
 }
-constexpr Value table(const Keys& keys) {
+constexpr KeyValue table(const TableKeys& keys) {
     return {.type = Type::table, .keys = &keys};
 }
-constexpr Value table() {
+constexpr KeyValue table() {
     return {.type = Type::table};
 }  // of a reader without rows
-constexpr Value tables() {
+constexpr KeyValue tables() {
     return {.type = Type::tables};
 }  // likewise
-constexpr Value tables(const Keys& keys) {
+constexpr KeyValue tables(const TableKeys& keys) {
     return {.type = Type::tables, .keys = &keys};
 }
 /// The value, or a text that names a file.
-constexpr Value or_file(Value value) {
+constexpr KeyValue or_file(KeyValue value) {
     value.or_file = true;
     return value;
 }

@@ -24,7 +24,7 @@ public:
     static Result<TomlFile> read(const std::string& path, const std::string& head);
 
     /// `name` as in "unknown key "x" in NAME". The file outlives the reader.
-    [[nodiscard]] TableReader root(std::string name, Problems& problems, const Keys* keys = nullptr) const {
+    [[nodiscard]] TableReader root(std::string name, Problems& problems, const TableKeys* keys = nullptr) const {
         return TableReader(*table_, std::move(name), problems, keys);
     }
     /// What the files say together.

@@ -43,7 +43,7 @@ std::string shown(const toml::node& node) {
     return std::string(type_words(node));
 }
 
-Place place_of(const toml::source_region& at) {
+FilePlace place_of(const toml::source_region& at) {
     return {at.path ? *at.path : std::string(), static_cast<int>(at.begin.line), static_cast<int>(at.begin.column)};
 }
 
@@ -74,15 +74,15 @@ std::int64_t unix_ns_from(const toml::date_time& t) {
 
 }  // namespace
 
-void Problems::add(const Place& at, std::string what) {
+void Problems::add(const FilePlace& at, std::string what) {
     add(at, Error{std::move(what), at.file.empty() ? file_ : at.file, at.line, at.column});
 }
 
-void Problems::add(const Place& at, Error error) {
+void Problems::add(const FilePlace& at, Error error) {
     problems_.push_back({false, at.line, at.column, std::move(error)});
 }
 
-void Problems::add_missing(const Place& at, std::string what) {
+void Problems::add_missing(const FilePlace& at, std::string what) {
     add(at, std::move(what));
     problems_.back().is_missing_key = true;
 }
@@ -92,10 +92,10 @@ Error Problems::first() const {
     return std::ranges::min_element(problems_, {}, order)->error;
 }
 
-TableReader::TableReader(const toml::table& table, std::string name, Problems& problems, const Keys* keys)
+TableReader::TableReader(const toml::table& table, std::string name, Problems& problems, const TableKeys* keys)
     : table_(&table), name_(std::move(name)), problems_(&problems), keys_(keys) {
     if (keys_)
-        for (const Key* key : keys_->all_rows())
+        for (const TableKey* key : keys_->all_rows())
             if (!key->required.empty()) require(key->name, key->required);
 }
 
@@ -104,19 +104,19 @@ const toml::node* TableReader::find(std::string_view key) {
     return table_->get(key);
 }
 
-const Value& TableReader::row(std::string_view key, [[maybe_unused]] Value::Type type) const {
-    static constexpr Value kNone{};
-    const Key* const found = keys_ ? keys_->find(key, kind_) : nullptr;
+const KeyValue& TableReader::row(std::string_view key, [[maybe_unused]] KeyValue::Type type) const {
+    static constexpr KeyValue kNone{};
+    const TableKey* const found = keys_ ? keys_->find(key, kind_) : nullptr;
     if (!found) {
         assert(!keys_ && "a key that is read has a row");
         return kNone;
     }
-    using enum Value::Type;
+    using enum KeyValue::Type;
     assert(found->value.type == type || (type == text && (found->value.or_file || found->value.type == choice)));
     return found->value;
 }
 
-Place TableReader::place(std::string_view key) const {
+FilePlace TableReader::place(std::string_view key) const {
     const toml::node* node = table_->get(key);
     return place_of(node ? node->source() : table_->source());
 }
@@ -133,36 +133,36 @@ void TableReader::require(std::string_view key, std::string_view expected) {
 
 std::optional<std::size_t> TableReader::kind() {
     assert(keys_ && keys_->kinds);
-    const std::vector<Kind> kinds = keys_->kinds();
+    const std::vector<TableKind> kinds = keys_->kinds();
     const auto rows = keys_->all_rows();
-    const auto at = std::ranges::find(rows, Value::Type::kind, [](const Key* k) { return k->value.type; });
+    const auto at = std::ranges::find(rows, KeyValue::Type::kind, [](const TableKey* k) { return k->value.type; });
     assert(at != rows.end());
-    const Key& key = **at;
+    const TableKey& key = **at;
     const auto index = [&](std::string_view name) {
-        return static_cast<std::size_t>(std::ranges::find(kinds, name, &Kind::name) - kinds.begin());
+        return static_cast<std::size_t>(std::ranges::find(kinds, name, &TableKind::name) - kinds.begin());
     };
     if (!has(key.name)) {
         if (key.value.otherwise.empty()) return std::nullopt;
         kind_ = static_cast<int>(index(key.value.otherwise));
     } else {
         std::vector<std::string_view> names;
-        for (const Kind& k : kinds) names.push_back(k.name);
+        for (const TableKind& k : kinds) names.push_back(k.name);
         const auto given = word(key.name, names);
         if (!given) return std::nullopt;
         kind_ = static_cast<int>(*given);
     }
-    const Kind& own = kinds[static_cast<std::size_t>(kind_)];
+    const TableKind& own = kinds[static_cast<std::size_t>(kind_)];
     for (const auto& [node_key, value] : *table_) {
         if (keys_->find(node_key.str(), kind_)) continue;
         std::string owners;
-        for (const Kind& k : kinds)
-            if (std::ranges::find(k.rows, node_key.str(), &Key::name) != k.rows.end())
+        for (const TableKind& k : kinds)
+            if (std::ranges::find(k.rows, node_key.str(), &TableKey::name) != k.rows.end())
                 owners += fmt::format("{}\"{}\"", owners.empty() ? "" : " or ", k.name);
         if (!owners.empty())
             refuse(node_key.str(),
                    fmt::format("belongs to {} = {}, and this is \"{}\"", key.name, owners, own.name));
     }
-    for (const Key& k : own.rows)
+    for (const TableKey& k : own.rows)
         if (!k.required.empty()) require(k.name, k.required);
     return kind_;
 }
@@ -178,7 +178,7 @@ auto TableReader::value(std::string_view key, const Take& take, const std::strin
 }
 
 std::optional<double> TableReader::number(std::string_view key) {
-    return number(key, row(key, Value::Type::number).range);
+    return number(key, row(key, KeyValue::Type::number).range);
 }
 
 std::optional<double> TableReader::number(std::string_view key, const Range& range) {
@@ -190,7 +190,7 @@ std::optional<double> TableReader::number(std::string_view key, const Range& ran
 }
 
 std::optional<std::int64_t> TableReader::integer(std::string_view key) {
-    const Value& own = row(key, Value::Type::integer);
+    const KeyValue& own = row(key, KeyValue::Type::integer);
     return integer(key, own.low, own.high);
 }
 
@@ -203,19 +203,19 @@ std::optional<std::int64_t> TableReader::integer(std::string_view key, std::int6
 }
 
 std::optional<bool> TableReader::boolean(std::string_view key) {
-    (void)row(key, Value::Type::boolean);
+    (void)row(key, KeyValue::Type::boolean);
     return value(
         key, [](const toml::node& node) { return node.value_exact<bool>(); }, "true or false");
 }
 
 std::optional<std::string> TableReader::text(std::string_view key) {
-    (void)row(key, Value::Type::text);
+    (void)row(key, KeyValue::Type::text);
     return value(
         key, [](const toml::node& node) { return node.value_exact<std::string>(); }, "a text in quotes");
 }
 
 std::optional<std::vector<std::string>> TableReader::texts(std::string_view key) {
-    (void)row(key, Value::Type::texts);
+    (void)row(key, KeyValue::Type::texts);
     const auto take = [](const toml::node& node) -> std::optional<std::vector<std::string>> {
         const toml::array* array = node.as_array();
         if (!array || !(array->empty() || array->is_homogeneous(toml::node_type::string))) return std::nullopt;
@@ -226,7 +226,7 @@ std::optional<std::vector<std::string>> TableReader::texts(std::string_view key)
     return value(key, take, "an array of texts in quotes");
 }
 
-std::optional<std::vector<double>> TableReader::numbers(std::string_view key, const Value& expected) {
+std::optional<std::vector<double>> TableReader::numbers(std::string_view key, const KeyValue& expected) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     const toml::array* array = node->as_array();
@@ -253,18 +253,18 @@ std::optional<std::vector<double>> TableReader::numbers(std::string_view key, co
 }
 
 std::optional<std::vector<double>> TableReader::numbers(std::string_view key) {
-    return numbers(key, row(key, Value::Type::numbers));
+    return numbers(key, row(key, KeyValue::Type::numbers));
 }
 
 std::optional<std::vector<double>> TableReader::numbers(std::string_view key, std::initializer_list<int> counts,
                                                         const Range& range) {
-    Value expected{.type = Value::Type::numbers, .range = range};
+    KeyValue expected{.type = KeyValue::Type::numbers, .range = range};
     std::ranges::copy(counts, expected.counts.begin());
     return numbers(key, expected);
 }
 
 std::optional<Vec3> TableReader::vec3(std::string_view key) {
-    return vec3(key, row(key, Value::Type::numbers).range);
+    return vec3(key, row(key, KeyValue::Type::numbers).range);
 }
 
 std::optional<Vec3> TableReader::vec3(std::string_view key, const Range& range) {
@@ -281,14 +281,14 @@ Vec3 scaled_to_one(const Vec3& a) {
 }
 
 std::optional<Vec3> TableReader::direction(std::string_view key) {
-    const auto v = vec3(key, row(key, Value::Type::direction).range);
+    const auto v = vec3(key, row(key, KeyValue::Type::direction).range);
     if (!v) return std::nullopt;
     if (*v == Vec3{}) return fail(key, "expected a direction, of any length but 0"), std::nullopt;
     return normalized(scaled_to_one(*v));
 }
 
 std::optional<std::array<double, 2>> TableReader::pair(std::string_view key) {
-    return pair(key, row(key, Value::Type::numbers).range);
+    return pair(key, row(key, KeyValue::Type::numbers).range);
 }
 
 std::optional<std::array<double, 2>> TableReader::pair(std::string_view key, const Range& range) {
@@ -298,7 +298,7 @@ std::optional<std::array<double, 2>> TableReader::pair(std::string_view key, con
 }
 
 std::optional<Rgb> TableReader::rgb(std::string_view key) {
-    return rgb(key, row(key, Value::Type::rgb).range);
+    return rgb(key, row(key, KeyValue::Type::rgb).range);
 }
 
 std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
@@ -315,7 +315,7 @@ std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
 }
 
 std::optional<Quat> TableReader::attitude(std::string_view key) {
-    (void)row(key, Value::Type::attitude);
+    (void)row(key, KeyValue::Type::attitude);
     const auto v = numbers(key, {4});
     if (!v) return std::nullopt;
     const Quat q{(*v)[0], (*v)[1], (*v)[2], (*v)[3]};
@@ -328,7 +328,7 @@ std::optional<Quat> TableReader::attitude(std::string_view key) {
 }
 
 std::optional<std::array<int, 2>> TableReader::size(std::string_view key) {
-    return size(key, static_cast<int>(row(key, Value::Type::size).high));
+    return size(key, static_cast<int>(row(key, KeyValue::Type::size).high));
 }
 
 std::optional<std::array<int, 2>> TableReader::size(std::string_view key, int high) {
@@ -346,7 +346,7 @@ std::optional<std::array<int, 2>> TableReader::size(std::string_view key, int hi
 }
 
 std::optional<std::vector<Vec3>> TableReader::points(std::string_view key) {
-    return points(key, row(key, Value::Type::points).count_max);
+    return points(key, row(key, KeyValue::Type::points).count_max);
 }
 
 std::optional<std::vector<Vec3>> TableReader::points(std::string_view key, int count_max) {
@@ -371,7 +371,7 @@ std::optional<std::vector<Vec3>> TableReader::points(std::string_view key, int c
 
 std::optional<std::int64_t> TableReader::date(std::string_view key) {
     constexpr int kFirstYear = 1900, kLastYear = 2099;  // of ERFA's Earth ephemeris and of int64 nanoseconds
-    (void)row(key, Value::Type::date);
+    (void)row(key, KeyValue::Type::date);
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     const std::optional<toml::date_time> t = date_of(*node);
@@ -382,7 +382,7 @@ std::optional<std::int64_t> TableReader::date(std::string_view key) {
 }
 
 std::optional<std::size_t> TableReader::word(std::string_view key) {
-    return word(key, row(key, Value::Type::choice).words());
+    return word(key, row(key, KeyValue::Type::choice).words());
 }
 
 std::optional<std::size_t> TableReader::word(std::string_view key, const std::vector<std::string_view>& words) {
@@ -405,11 +405,11 @@ bool TableReader::is_table(std::string_view key) {
     return node && node->is_table();
 }
 
-std::optional<TableReader> TableReader::table(std::string_view key, const Keys* keys) {
+std::optional<TableReader> TableReader::table(std::string_view key, const TableKeys* keys) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     if (const toml::table* t = node->as_table()) {
-        if (keys_) keys = row(key, Value::Type::table).keys;
+        if (keys_) keys = row(key, KeyValue::Type::table).keys;
         return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_, keys);
     }
     fail(key, fmt::format("got {}, expected a table", shown(*node)));
@@ -425,7 +425,7 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
         return {};
     }
     std::vector<TableReader> out;
-    const Keys* const keys = row(key, Value::Type::tables).keys;
+    const TableKeys* const keys = row(key, KeyValue::Type::tables).keys;
     for (const toml::node& element : *array)
         out.emplace_back(*element.as_table(), fmt::format("[[{}]]", key), *problems_, keys);
     return out;
@@ -458,11 +458,11 @@ void TableReader::refuse_keys_of_other_kinds(std::string_view kind, std::span<co
 void TableReader::finish() {
     std::vector<std::string> known = asked_;
     if (keys_) {
-        for (const Key* key : keys_->all_rows()) known.emplace_back(key->name);
-        const std::vector<Kind> kinds = keys_->kinds ? keys_->kinds() : std::vector<Kind>{};
+        for (const TableKey* key : keys_->all_rows()) known.emplace_back(key->name);
+        const std::vector<TableKind> kinds = keys_->kinds ? keys_->kinds() : std::vector<TableKind>{};
         for (std::size_t k = 0; k < kinds.size(); ++k)
             if (kind_ < 0 || kind_ == static_cast<int>(k))
-                for (const Key& key : kinds[k].rows) known.emplace_back(key.name);
+                for (const TableKey& key : kinds[k].rows) known.emplace_back(key.name);
     }
     for (const auto& [key, value] : *table_)
         if (std::ranges::find(known, key.str()) == known.end())

@@ -29,7 +29,7 @@ class table;
 namespace narpa {
 
 /// Where a key or value stands in a file.
-struct Place {
+struct FilePlace {
     std::string file{};
     int line = 0, column = 0;
 };
@@ -38,11 +38,11 @@ struct Place {
 class Problems {
 public:
     explicit Problems(std::string file) : file_(std::move(file)) {}
-    void add(const Place& at, std::string what);
+    void add(const FilePlace& at, std::string what);
     /// A missing key. Reported when nothing else is wrong: it may be present under a misspelt name.
-    void add_missing(const Place& at, std::string what);
+    void add_missing(const FilePlace& at, std::string what);
     /// An error of another file (a mesh, a texture) that was named at this place.
-    void add(const Place& at, Error error);
+    void add(const FilePlace& at, Error error);
     [[nodiscard]] bool none() const { return problems_.empty(); }
     /// The first in the file; missing keys come last.
     [[nodiscard]] Error first() const;
@@ -74,14 +74,14 @@ class TableReader {
 public:
     /// `name` as the file has it: "[sun]", "[[camera]]", "sphere". Notes a problem for each required key that is
     /// absent. The table outlives the reader.
-    TableReader(const toml::table& table, std::string name, Problems& problems, const Keys* keys = nullptr);
+    TableReader(const toml::table& table, std::string name, Problems& problems, const TableKeys* keys = nullptr);
 
     [[nodiscard]] const std::string& name() const { return name_; }
     [[nodiscard]] bool has(std::string_view key) { return find(key) != nullptr; }
     /// Notes a problem when the key is absent; `expected` completes "expected ...".
     void require(std::string_view key, std::string_view expected);
 
-    /// The index of the table's kind in `Keys::kinds`. Refuses keys that only other kinds have.
+    /// The index of the table's kind in `TableKeys::kinds`. Refuses keys that only other kinds have.
     std::optional<std::size_t> kind();
 
     std::optional<double> number(std::string_view key);
@@ -150,7 +150,7 @@ public:
     /// The index of a choice among the words of its row.
     std::optional<std::size_t> word(std::string_view key);
     /// `keys`: those of the table where the row of `key` names none.
-    std::optional<TableReader> table(std::string_view key, const Keys* keys = nullptr);
+    std::optional<TableReader> table(std::string_view key, const TableKeys* keys = nullptr);
     /// The tables of `[[key]]`, in the file's order.
     std::vector<TableReader> tables(std::string_view key);
 
@@ -163,7 +163,7 @@ public:
     void refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds);
     /// Notes a problem at the value of a key (at the table when absent).
     void fail(std::string_view key, const std::string& what);
-    [[nodiscard]] Place place(std::string_view key) const;
+    [[nodiscard]] FilePlace place(std::string_view key) const;
     /// Every unknown key is a problem. Call it last.
     void finish();
 
@@ -171,8 +171,8 @@ private:
     /// The node of a key, counted as read; null when absent.
     const toml::node* find(std::string_view key);
     /// What the key's row says. It has a row of this type.
-    [[nodiscard]] const Value& row(std::string_view key, Value::Type type) const;
-    std::optional<std::vector<double>> numbers(std::string_view key, const Value& expected);
+    [[nodiscard]] const KeyValue& row(std::string_view key, KeyValue::Type type) const;
+    std::optional<std::vector<double>> numbers(std::string_view key, const KeyValue& expected);
     std::optional<std::size_t> word(std::string_view key, const std::vector<std::string_view>& words);
     /// The result of `take` for the key's node; notes a problem if it is empty.
     template <class Take>
@@ -182,8 +182,8 @@ private:
     const toml::table* table_;
     std::string name_;
     Problems* problems_;
-    const Keys* keys_;  ///< null: of a table without rows
-    int kind_ = -1;     ///< index in Keys::kinds; -1: not known
+    const TableKeys* keys_;  ///< null: of a table without rows
+    int kind_ = -1;          ///< index in TableKeys::kinds; -1: not known
     std::vector<std::string> asked_;
 };
 

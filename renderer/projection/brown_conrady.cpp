@@ -97,7 +97,8 @@ NARPA_EACH_ISA void directions_of(const Model& m, const Pinhole& pinhole, const 
 
 namespace {
 
-constexpr std::array<Key, 1> kBrownConradyKeys{{{"coefficients", rows::numbers({4, 5, 8, 12}), kCoefficients}}};
+constexpr std::array<TableKey, 1> kBrownConradyKeys{
+    {{"coefficients", rows::numbers({4, 5, 8, 12}), kCoefficients}}};
 constexpr std::array<RosName, 2> kBrownConradyRosNames{{{"plumb_bob", 5}, {"rational_polynomial", 12}}};
 
 }  // namespace

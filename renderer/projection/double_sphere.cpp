@@ -9,7 +9,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::array<Key, 2> kDoubleSphereKeys{{
+constexpr std::array<TableKey, 2> kDoubleSphereKeys{{
     {"xi", rows::number({.low = -1, .high = 1, .low_open = true, .high_open = true}), "a number in (-1, 1)"},
     {"alpha", rows::number({.low = 0, .high = 1}), "a number in [0, 1]"},
 }};

@@ -79,7 +79,7 @@ NARPA_EACH_ISA void directions_of(const KannalaBrandt& m, const Pinhole& pinhole
 
 namespace {
 
-constexpr std::array<Key, 1> kKannalaBrandtKeys{{{"coefficients", rows::numbers({4}), kCoefficients}}};
+constexpr std::array<TableKey, 1> kKannalaBrandtKeys{{{"coefficients", rows::numbers({4}), kCoefficients}}};
 constexpr std::array<RosName, 2> kKannalaBrandtRosNames{{{"equidistant", 4}, {"fisheye", 4}}};
 
 }  // namespace

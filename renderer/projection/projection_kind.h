@@ -20,10 +20,10 @@ struct RosName {
 };
 
 struct ProjectionKind {
-    std::string_view name;           ///< of `projection = {kind = ...}` in scene files
-    std::string_view opencv{};       ///< of `distortion = {model = ...}`; empty: no model of OpenCV
-    std::span<const RosName> ros{};  ///< empty: ROS has no name for it
-    std::span<const Key> keys{};     ///< of its parameters: an array of numbers, or a number each
+    std::string_view name;             ///< of `projection = {kind = ...}` in scene files
+    std::string_view opencv{};         ///< of `distortion = {model = ...}`; empty: no model of OpenCV
+    std::span<const RosName> ros{};    ///< empty: ROS has no name for it
+    std::span<const TableKey> keys{};  ///< of its parameters: an array of numbers, or a number each
     double fov_max_deg = 180;
     /// `parameters`: as many as the keys allow.
     std::shared_ptr<const CameraModel> (*make)(const Pinhole& pinhole,

@@ -25,7 +25,7 @@ const ProjectionKind* found(std::string_view name, std::string_view ProjectionKi
 }  // namespace
 
 bool ProjectionKind::takes(std::size_t parameters) const {
-    const bool is_array = keys.size() == 1 && keys[0].value.type == Value::Type::numbers;
+    const bool is_array = keys.size() == 1 && keys[0].value.type == KeyValue::Type::numbers;
     return is_array ? keys[0].value.allows(parameters) : parameters == keys.size();
 }
 

@@ -8,7 +8,7 @@ namespace narpa {
 
 namespace {
 
-constexpr Key kMountingRows[]{
+constexpr TableKey kMountingRows[]{
     {"name", rows::text(), "a text"},    {"mount", rows::text()},   {"position_m", rows::vec3()},
     {"attitude_wxyz", rows::attitude()}, {"look_at", rows::vec3()}, {"up", rows::vec3()},
 };
@@ -52,7 +52,7 @@ void read_look_at(TableReader& table, Rigid3& T, AttitudeOf attitude_of) {
 
 }  // namespace
 
-constinit const Keys kMountingKeys{.rows = kMountingRows};
+constinit const TableKeys kMountingKeys{.rows = kMountingRows};
 
 Quat camera_attitude(const Vec3& forward, const Vec3& right) {
     return quat_from_columns(right, cross(forward, right), forward);

@@ -9,8 +9,8 @@
 
 namespace narpa {
 
-/// `name`, `mount`, `position_m`, `attitude_wxyz`, `look_at`, `up`: a part of the Keys of what is mounted.
-extern const Keys kMountingKeys;
+/// `name`, `mount`, `position_m`, `attitude_wxyz`, `look_at`, `up`: a part of the keys of what is mounted.
+extern const TableKeys kMountingKeys;
 
 struct Mounting {
     int mount = -1;  ///< body that carries it; -1 is the world

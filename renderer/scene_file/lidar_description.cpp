@@ -30,7 +30,7 @@ constexpr std::array<std::pair<std::string_view, Spacing>, 2> kSpacings{
 constexpr std::array<std::pair<std::string_view, Scan>, 3> kScans{
     {{"flash", Scan::flash}, {"rows", Scan::rows}, {"columns", Scan::columns}}};
 
-constexpr Key kHeadRows[]{
+constexpr TableKey kHeadRows[]{
     {"based_on", rows::file()},
     {"name", rows::text(), "a text"},
     {"rate_hz", rows::number(kRate), "frames a second"},
@@ -44,7 +44,7 @@ constexpr Key kHeadRows[]{
     {"data_port", rows::integer(1, 65535)},
     {"shots", rows::file()},
 };
-constexpr Key kGridRows[]{
+constexpr TableKey kGridRows[]{
     {"columns", rows::integer(1, 65535), "a count"},
     {"rows", rows::integer(1, 65535), "a count"},
     {"fov_horizontal_deg", rows::number({.low = 0, .high = 360, .low_open = true}), "an angle"},
@@ -54,19 +54,19 @@ constexpr Key kGridRows[]{
     {"two_way", rows::boolean()},
     {"scan_share", rows::number(kShare)},
 };
-constexpr Key kSpinRows[]{
+constexpr TableKey kSpinRows[]{
     {"columns", rows::integer(1, 65536), "a count: firings in a turn"},
     {"elevation_deg", rows::numbers_up_to(kMaxBeams, kElevation_deg), "an array of angles, one for each laser"},
     {"azimuth_deg", rows::numbers_up_to(kMaxBeams, {.low = -180, .high = 180})},
 };
-constexpr Key kBeamRows[]{
+constexpr TableKey kBeamRows[]{
     {"azimuth_deg", rows::number(kAzimuth_deg), "an angle, clockwise from y"},
     {"elevation_deg", rows::number(kElevation_deg), "an angle above the plane of x and y"},
     {"phase", rows::number(kPhase)},
 };
-constexpr Keys kHeadKeys{.rows = kHeadRows}, kGridKeys{.rows = kGridRows}, kSpinKeys{.rows = kSpinRows},
+constexpr TableKeys kHeadKeys{.rows = kHeadRows}, kGridKeys{.rows = kGridRows}, kSpinKeys{.rows = kSpinRows},
     kBeamKeys{.rows = kBeamRows};
-constexpr Key kDescriptionRows[]{
+constexpr TableKey kDescriptionRows[]{
     {"lidar", rows::table(kHeadKeys), "a table [lidar]"},
     {"grid", rows::table(kGridKeys)},
     {"spin", rows::table(kSpinKeys)},
@@ -260,7 +260,7 @@ Result<LidarMake> read_description(const std::string& file) {
 
 }  // namespace
 
-constinit const Keys kLidarDescriptionKeys{.rows = kDescriptionRows};
+constinit const TableKeys kLidarDescriptionKeys{.rows = kDescriptionRows};
 
 Result<LidarMake> read_lidar_description(const std::string& file) {
     try {

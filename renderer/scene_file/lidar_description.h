@@ -9,7 +9,7 @@
 
 namespace narpa {
 
-extern const Keys kLidarDescriptionKeys;
+extern const TableKeys kLidarDescriptionKeys;
 
 /// Errors name the file and the line, and what was expected.
 [[nodiscard]] Result<LidarMake> read_lidar_description(const std::string& file);

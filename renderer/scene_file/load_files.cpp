@@ -200,7 +200,7 @@ void load_named_files(SceneReading& reading) {
     if (!reading.problems.none()) return;
     for (const NamedTexture& texture : reading.textures) check_coordinates(texture, reading);
     if (reading.scene.materials.size() > std::numeric_limits<std::uint16_t>::max())
-        reading.problems.add(Place{}, "more than 65535 materials");
+        reading.problems.add(FilePlace{}, "more than 65535 materials");
 }
 
 }  // namespace narpa

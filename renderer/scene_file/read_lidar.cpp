@@ -42,7 +42,7 @@ std::vector<std::string_view> profile_names() {
 }
 
 /// Makes narrow the ranges of `rate_hz`, `columns`, `range_min_m` and `range_max_m`.
-constexpr Key kLidarRows[]{
+constexpr TableKey kLidarRows[]{
     {"model", rows::or_file(rows::choice(make_names)), "\"VLP-16\""},
     {"rate_hz", rows::number({.low = 0, .high = 1e4, .low_open = true})},
     {"pps", rows::choice<kPpsStates>()},
@@ -172,7 +172,7 @@ bool lights_an_area(const Lidar& lidar) {
 
 }  // namespace
 
-constinit const Keys kLidarKeys{.rows = kLidarRows, .parts = {&kMountingKeys}};
+constinit const TableKeys kLidarKeys{.rows = kLidarRows, .parts = {&kMountingKeys}};
 
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                  const std::filesystem::path& folder) {

@@ -11,7 +11,7 @@ namespace narpa {
 namespace {
 
 constexpr Range kAngle_deg{.low = -360, .high = 360};
-constexpr Key kObserverRows[]{
+constexpr TableKey kObserverRows[]{
     {"latitude_deg", rows::number({.low = -90, .high = 90}), "the geodetic latitude, north positive"},
     {"longitude_deg", rows::number(kAngle_deg), "the longitude, east positive"},
     {"height_m", rows::number({.low = -1000, .high = 20'000})},
@@ -23,7 +23,7 @@ constexpr Key kObserverRows[]{
     {"sees", rows::texts()},
     {"sun", rows::boolean()},
 };
-constexpr Key kOrbitRows[]{
+constexpr TableKey kOrbitRows[]{
     {"semi_major_axis_m", rows::number({.low = 6.4e6, .high = 1e9}), "a length from the Earth's centre"},
     {"eccentricity", rows::number({.low = 0, .high = 1, .high_open = true})},
     {"inclination_deg", rows::number(kAngle_deg)},
@@ -31,7 +31,7 @@ constexpr Key kOrbitRows[]{
     {"argument_of_perigee_deg", rows::number(kAngle_deg)},
     {"mean_anomaly_deg", rows::number(kAngle_deg)},
 };
-constexpr Key kTrackingRows[]{{"track", rows::text()}, {"azimuth_elevation_deg", rows::pair(kAngle_deg)}};
+constexpr TableKey kTrackingRows[]{{"track", rows::text()}, {"azimuth_elevation_deg", rows::pair(kAngle_deg)}};
 
 ObserverPlace read_place(TableReader& table) {
     ObserverPlace place;
@@ -67,7 +67,7 @@ void turn_earth(TableReader& table, const GroundObserver& observer, std::vector<
 
 }  // namespace
 
-constinit const Keys kObserverKeys{.rows = kObserverRows}, kOrbitKeys{.rows = kOrbitRows},
+constinit const TableKeys kObserverKeys{.rows = kObserverRows}, kOrbitKeys{.rows = kOrbitRows},
     kTrackingKeys{.rows = kTrackingRows};
 
 void read_orbit(TableReader& body_table, Body& body) {

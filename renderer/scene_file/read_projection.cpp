@@ -35,9 +35,9 @@ ProjectionParameters read_kind(TableReader& camera, const char* key, const char*
         if (!(kind->*name).empty()) kinds.emplace_back(kind->*name, kind);
     table->require(kind_key, "\"opencv\" or \"fisheye\"");
     p.kind = table->choice<const ProjectionKind*>(kind_key, kinds).value_or(&kPinhole);
-    for (const Key& row : p.kind->keys) {
+    for (const TableKey& row : p.kind->keys) {
         table->require(row.name, row.required);
-        if (row.value.type == Value::Type::numbers) {
+        if (row.value.type == KeyValue::Type::numbers) {
             p.values = p.kind == &kKannalaBrandt
                            ? table->numbers(row.name, {4}).value_or(std::vector<double>(4))
                            : table->numbers(row.name, {4, 5, 8, 12}).value_or(std::vector<double>(4));

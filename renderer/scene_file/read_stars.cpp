@@ -11,7 +11,7 @@ constexpr Range kYears{.low = 1000, .high = 3000};  // straight proper motion is
 constexpr double kFastest_m_s = 2.9e8;              // below the speed of light
 
 /// An error at a line of the catalogue keeps its location; others get that of the scene file.
-Error blamed(Error error, const Place& place, const std::string& scene_file) {
+Error blamed(Error error, const FilePlace& place, const std::string& scene_file) {
     if (error.line == 0)
         return {
             .what = "catalogue: " + error.text(), .file = scene_file, .line = place.line, .column = place.column};
@@ -37,7 +37,7 @@ void read_stars(TableReader& root, SceneReading& reading, std::optional<double> 
     if (const auto name = table->text("catalogue")) {
         const auto catalogue = read_star_catalogue((reading.folder / *name).string());
         if (!catalogue) {
-            const Place place = table->place("catalogue");
+            const FilePlace place = table->place("catalogue");
             return reading.problems.add(place, blamed(catalogue.error(), place, reading.problems.file()));
         }
         for (const CatalogueStar& star : *catalogue)

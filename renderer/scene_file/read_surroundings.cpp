@@ -11,13 +11,13 @@ namespace narpa {
 
 namespace {
 
-constexpr Key kSceneRows[]{{"name", rows::text()}, {"based_on", rows::file()}, {"epoch", rows::date()}};
-constexpr Key kSunRows[]{
+constexpr TableKey kSceneRows[]{{"name", rows::text()}, {"based_on", rows::file()}, {"epoch", rows::date()}};
+constexpr TableKey kSunRows[]{
     {"irradiance_w_m2", rows::number(kPositive)},
     {"angular_diameter_deg", rows::number({.low = 0, .high = 180, .high_open = true})},
     {"direction", rows::direction()},
 };
-constexpr Key kRenderRows[]{
+constexpr TableKey kRenderRows[]{
     {"method", rows::choice<kMethods>()},
     {"max_depth", rows::integer(1, 40)},
     {"spp", rows::integer(1, 65535)},
@@ -101,7 +101,8 @@ void read_render(TableReader& root, Scene& scene) {
 
 }  // namespace
 
-constinit const Keys kSceneKeys{.rows = kSceneRows}, kSunKeys{.rows = kSunRows}, kRenderKeys{.rows = kRenderRows};
+constinit const TableKeys kSceneKeys{.rows = kSceneRows}, kSunKeys{.rows = kSunRows},
+    kRenderKeys{.rows = kRenderRows};
 
 void read_surroundings(TableReader& root, SceneReading& reading) {
     const bool has_epoch = reading.has_epoch = read_scene_table(root, reading.scene);

@@ -12,7 +12,7 @@ namespace narpa {
 
 namespace {
 
-constexpr Key kSceneFileRows[]{
+constexpr TableKey kSceneFileRows[]{
     {"scene", rows::table(kSceneKeys)},
     {"sun", rows::table(kSunKeys)},
     {"ambient", rows::table()},
@@ -71,7 +71,7 @@ Result<Scene> read_files(const std::string& path) {
 
 }  // namespace
 
-constinit const Keys kSceneFileKeys{.rows = kSceneFileRows};
+constinit const TableKeys kSceneFileKeys{.rows = kSceneFileRows};
 
 Status use_method(Scene& scene, RenderSettings::Method method) {
     for (const Material& m : scene.materials)

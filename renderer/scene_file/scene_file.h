@@ -10,7 +10,7 @@
 namespace narpa {
 
 /// The tables of a scene file.
-extern const Keys kSceneFileKeys;
+extern const TableKeys kSceneFileKeys;
 
 /// Reads a scene and everything it names; paths inside are relative to the scene file. The key reference is
 /// docs/scene.md. Errors carry file, line and column; a key that is not known is an error.

@@ -22,7 +22,7 @@ struct NamedMesh {
     std::string path;
     double scale = 1, crease_rad = 0;  ///< of read_mesh
     std::optional<int> material;       ///< replaces the mesh's own; index into Scene::materials
-    Place place;
+    FilePlace place;
 };
 
 /// A texture that a `material` table names.
@@ -32,7 +32,7 @@ struct NamedTexture {
     std::string key;                           ///< "texture", "normal_texture" ...
     std::string path;
     TextureUse use{};
-    Place place;
+    FilePlace place;
 };
 
 /// A DEM that a body names: read when all else has been found good, as its triangles depend on the sensors.
@@ -40,7 +40,7 @@ struct NamedDem {
     std::size_t body = 0;
     DemRequest request{};
     int material = 0;  ///< index into Scene::materials
-    Place place;
+    FilePlace place;
 };
 
 /// State while one scene file is read.
@@ -55,9 +55,9 @@ struct SceneReading {
     std::optional<Observing> observer{};
 };
 
-extern const Keys kSceneKeys, kSunKeys, kRenderKeys, kObserverKeys, kLidarKeys;
-extern const Keys kOrbitKeys;     ///< of `orbit` of a body
-extern const Keys kTrackingKeys;  ///< of cameras at the observer: a part of their Keys
+extern const TableKeys kSceneKeys, kSunKeys, kRenderKeys, kObserverKeys, kLidarKeys;
+extern const TableKeys kOrbitKeys;     ///< of `orbit` of a body
+extern const TableKeys kTrackingKeys;  ///< of cameras at the observer: a part of their keys
 /// [scene], [sun], [ambient], [render].
 void read_surroundings(TableReader& root, SceneReading& reading);
 /// [stars], with its catalogue. `epoch_year`: that of [scene], if it has one.

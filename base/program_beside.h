@@ -1,7 +1,9 @@
-/// base/program_beside.h - finds the narpa programs that another narpa program starts.
+/// base/program_beside.h - finds the narpa programs and shared libraries that a narpa program uses.
 #pragma once
 
+#include <cstdlib>
 #include <filesystem>
+#include <sstream>
 #include <string>
 
 namespace narpa {
@@ -18,6 +20,20 @@ namespace narpa {
     std::error_code none;
     const std::filesystem::path beside = program_folder() / name;
     return std::filesystem::exists(beside, none) ? beside.string() : name;
+}
+
+/// Path of a shared library in the folder of the running program or, for it and for each folder of PATH, in
+/// ../lib/narpa; if there is none, its bare name.
+[[nodiscard]] inline std::string library_beside(const std::string& name) {
+    std::error_code none;
+    if (const auto beside = program_folder() / name; std::filesystem::exists(beside, none)) return beside.string();
+    const char* const path = std::getenv("PATH");
+    std::istringstream folders(program_folder().string() + ':' + (path != nullptr ? path : ""));
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        const auto installed = std::filesystem::path(folder) / "../lib/narpa" / name;
+        if (std::filesystem::exists(installed, none)) return installed.string();
+    }
+    return name;
 }
 
 }  // namespace narpa

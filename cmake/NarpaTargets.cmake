@@ -133,12 +133,11 @@ endfunction()
 
 function(narpa_executable name)
   add_executable(${name} ${ARGN})
-  if(TARGET narpa-mesh-reader AND NOT name STREQUAL "narpa-mesh-reader")
-    add_dependencies(${name} narpa-mesh-reader)  # programs that read scenes start it
-  endif()
-  if(TARGET narpa-dem-reader AND NOT name STREQUAL "narpa-dem-reader")
-    add_dependencies(${name} narpa-dem-reader)
-  endif()
+  foreach(used narpa-mesh-reader narpa-dem-reader narpa-image-codecs)  # programs that read scenes start or load them
+    if(TARGET ${used} AND NOT name STREQUAL ${used})
+      add_dependencies(${name} ${used})
+    endif()
+  endforeach()
   narpa_compile_options(${name})
 endfunction()
 

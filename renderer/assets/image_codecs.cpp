@@ -2,31 +2,21 @@
 
 #include <dlfcn.h>
 
+#include "base/program_beside.h"
+
 namespace narpa {
 namespace {
 
-/// Names by the C++ ABI of GCC and Clang (Itanium): cv::imdecode(InputArray, int) and
-/// cv::imencode(const std::string&, InputArray, std::vector<uchar>&, const std::vector<int>&).
-constexpr const char* kDecode = "_ZN2cv8imdecodeERKNS_11_InputArrayEi";
-constexpr const char* kEncode =
-    "_ZN2cv8imencodeERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEE"  // const std::string&
-    "RKNS_11_InputArrayERSt6vectorIhSaIhEERKSB_IiSaIiEE";
-
 struct Loaded {
-    ImageCodecs codecs;
-    std::string problem;  ///< empty: none
+    const ImageCodecs* codecs = nullptr;
+    std::string problem;
 };
 
 Loaded load() {
     Loaded l;
-    const auto found = [&](void* p) {
-        if (p == nullptr && l.problem.empty()) l.problem = dlerror();
-        return p;
-    };
-    void* library = found(dlopen(NARPA_OPENCV_IMGCODECS, RTLD_LAZY | RTLD_LOCAL));
-    if (library == nullptr) return l;
-    l.codecs.imdecode = reinterpret_cast<decltype(ImageCodecs::imdecode)>(found(dlsym(library, kDecode)));
-    l.codecs.imencode = reinterpret_cast<decltype(ImageCodecs::imencode)>(found(dlsym(library, kEncode)));
+    if (void* library = dlopen(library_beside("narpa-image-codecs.so").c_str(), RTLD_LAZY | RTLD_LOCAL))
+        l.codecs = static_cast<const ImageCodecs*>(dlsym(library, "narpa_image_codecs"));
+    if (l.codecs == nullptr) l.problem = dlerror();
     return l;
 }
 
@@ -34,7 +24,7 @@ Loaded load() {
 
 Result<ImageCodecs> image_codecs(const std::string& file) {
     static const Loaded loaded = load();
-    if (loaded.problem.empty()) return loaded.codecs;
+    if (loaded.codecs != nullptr) return *loaded.codecs;
     return Error{.what = "images need OpenCV's library of codecs, which cannot be loaded: " + loaded.problem,
                  .file = file,
                  .kind = ErrorKind::missing};

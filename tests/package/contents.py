@@ -24,7 +24,7 @@ wrong = []
 
 for name in [
     "bin/narpa", "bin/narpa-dynamics", "bin/narpa-navigation", "bin/narpa-mesh-reader",
-    "bin/narpa-bench", "bin/narpa-plot",
+    "bin/narpa-bench", "bin/narpa-plot", "lib/narpa/narpa-image-codecs.so",
     "share/narpa/LICENSE", "share/narpa/README.md", "share/narpa/docs/scene.md", "share/narpa/docs/interfaces.md",
     "share/narpa/protocols/can/README.md", "share/narpa/protocols/can/narpa.dbc",
     "share/narpa/examples/dynamics.py", "share/narpa/python/narpa/can.py",

@@ -9,7 +9,7 @@ namespace narpa {
 
 std::uint64_t path_radiance(const Transport& t, std::span<const PathStart> starts,
                             std::span<Rgb> radiance) noexcept {
-    assert(radiance.size() == starts.size() && t.path.max_depth >= 1);
+    assert(radiance.size() == starts.size() && t.path.max_depth >= 0);
     std::uint64_t traced = 0;
     for (std::size_t k = 0; k < starts.size(); k += kWavefront) {
         const std::size_t n = std::min(kWavefront, starts.size() - k);

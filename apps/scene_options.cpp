@@ -90,6 +90,7 @@ void BudgetOptions::add_to(Parser app) {
 void BudgetOptions::override_scene(RenderSettings& render) const {
     if (!spp && !budget_ms && !budget_rays) return;
     render.spp = spp.value_or(render.spp);
+    render.keep_deadline = render.keep_deadline && !spp;
     render.budget_ns = budget_ms ? std::llround(*budget_ms * 1e6) : 0;
     render.budget_rays = budget_rays.value_or(0);
 }

@@ -19,6 +19,7 @@ public:
 
     virtual ~Clock() = default;
     [[nodiscard]] virtual std::int64_t now_ns() const noexcept = 0;
+    [[nodiscard]] virtual bool is_real_time() const noexcept = 0;
     /// Simulation time `t_ns` on CLOCK_MONOTONIC.
     [[nodiscard]] virtual std::int64_t to_monotonic(std::int64_t t_ns) const noexcept = 0;
 
@@ -37,6 +38,7 @@ public:
     void start(std::int64_t lead_ns) noexcept { start_ns_ = monotonic_ns() + lead_ns; }
 
     [[nodiscard]] std::int64_t now_ns() const noexcept override { return monotonic_ns() - start_ns_; }
+    [[nodiscard]] bool is_real_time() const noexcept override { return true; }
     [[nodiscard]] std::int64_t to_monotonic(std::int64_t t_ns) const noexcept override { return t_ns + start_ns_; }
 
     /// Sleeps until the absolute time `t_ns`, checking the flag ten times a second. False: stopped.
@@ -68,6 +70,7 @@ public:
     void set(std::int64_t t_ns) noexcept { now_ns_ = t_ns; }
 
     [[nodiscard]] std::int64_t now_ns() const noexcept override { return now_ns_; }
+    [[nodiscard]] bool is_real_time() const noexcept override { return false; }
     /// The current time for every `t_ns`: nothing in lockstep waits for it.
     [[nodiscard]] std::int64_t to_monotonic(std::int64_t) const noexcept override { return monotonic_ns(); }
 

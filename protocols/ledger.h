@@ -33,8 +33,8 @@ enum class Delivery : std::uint8_t {
 inline constexpr std::array<std::string_view, 4> kDeliveries{"frame", "nothing", "repeated", "blank"};
 
 /// How far the frame got, by FrameLedger::step.
-inline constexpr std::array<std::string_view, 6> kStepNames{"refined",  "one_sample", "no_indirect",
-                                                            "coarse_2", "coarse_4",   "nothing"};
+inline constexpr std::array<std::string_view, 7> kStepNames{"refined",  "one_sample", "no_indirect", "coarse_2",
+                                                            "coarse_4", "nothing",    "sparse"};
 
 struct FrameLedger {
     static constexpr std::size_t kPasses = 8;

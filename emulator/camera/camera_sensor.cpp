@@ -96,7 +96,7 @@ void CameraSensor::advance(std::optional<double> level) noexcept {
 
 void CameraSensor::warm_up() {
     for (int i = 0; i < 2; ++i) unit_.warm_up();
-    const FrameLedger ledger = unit_.expose(next_, 0, monotonic_ns() + world_.scene().render.budget_ns);
+    const FrameLedger ledger = unit_.expose(next_, 0, monotonic_ns() + (deadline_ns() - t_mid_ns_));
     unit_.embed(ledger);
     unit_.handed_over(monotonic_ns());
 }
@@ -110,7 +110,8 @@ void CameraSensor::make_next(const Clock& clock) {
     const std::int64_t deadline = deadline_ns(), started = clock.now_ns();
     const std::int64_t wall_start = monotonic_ns();
 
-    FrameLedger ledger = unit_.expose(next_, t_mid_ns_, clock.to_monotonic(deadline));
+    const bool timed = clock.is_real_time() || world_.scene().render.budget_ns > 0;
+    FrameLedger ledger = unit_.expose(next_, t_mid_ns_, timed ? clock.to_monotonic(deadline) : 0);
     ledger.t_render_start_ns = started;
     ledger.t_render_end_ns = clock.now_ns();
     ledger.t_deadline_ns = deadline;

@@ -10,7 +10,7 @@
 namespace narpa {
 
 static_assert(FrameLedger::kPasses == kMaxPasses);
-static_assert(kStepNames.size() == static_cast<std::size_t>(FrameStep::nothing) + 1);
+static_assert(kStepNames.size() == static_cast<std::size_t>(FrameStep::sparse) + 1);
 
 double full_scale_radiance(const Camera& camera) noexcept {
     if (!camera.detector) return camera.white_radiance;
@@ -74,6 +74,9 @@ FrameBudget CameraUnit::budget(std::int64_t deadline_ns) const noexcept {
     } else if (render.budget_ns > 0) {
         budget.kind = FrameBudget::Kind::time;
         budget.deadline_ns = deadline_ns - std::min(allowance_.ns(), render.budget_ns / 2);
+    } else if (deadline_ns > 0 && render.keep_deadline) {
+        budget.kind = FrameBudget::Kind::aim;
+        budget.deadline_ns = deadline_ns - std::min(allowance_.ns(), camera_.period_ns / 2);
     }
     return budget;
 }
@@ -84,7 +87,9 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, std::
 }
 
 void CameraUnit::warm_up() {
-    FrameBudget all = budget(0);
+    FrameBudget all = budget(monotonic_ns());
+    if (all.kind == FrameBudget::Kind::aim)  // measures what `spp` takes
+        embed(expose(0, 0, FrameBudget{}, nullptr, nullptr));
     if (all.kind != FrameBudget::Kind::samples) {
         all.kind = FrameBudget::Kind::passes;
         all.step = static_cast<std::uint8_t>(FrameStep::refined);
@@ -119,8 +124,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     durations_.radiance_ns = t_radiance_ns_ - begun_ns;
     const std::int64_t lit_ns = t_radiance_ns_;
     // The allowance includes the time by which the renderer stopped late.
-    if (settings.budget.kind == FrameBudget::Kind::time)
-        t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
+    if (account.timed) t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
     narpa::expose(camera_, radiance_, settings.seed, frame, bytes_, sensor_array_.get());
     if (camera_.control) read_out(format(), settings_.region, settings_.binning, bytes_);
     durations_.sensor_ns = monotonic_ns() - lit_ns;
@@ -152,6 +156,9 @@ void CameraUnit::put_cost(const FrameAccount& account, FrameLedger& ledger) cons
     } else if (render.budget_ns > 0) {
         ledger.budget_kind = BudgetKind::time;
         ledger.budget = static_cast<std::uint64_t>(render.budget_ns);
+    } else if (account.timed) {
+        ledger.budget_kind = BudgetKind::time;
+        ledger.budget = static_cast<std::uint64_t>(camera_.period_ns);
     } else {
         ledger.budget = static_cast<std::uint64_t>(render.spp);
     }

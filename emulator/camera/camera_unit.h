@@ -64,7 +64,7 @@ public:
 
     /// Renders frame `frame` as it is at t_mid. The same frame number, time and poses give the same bytes.
     /// Fills the ledger's identity, pose and exposure; the caller adds when it was made. `aovs` may be null.
-    /// `deadline_ns`: CLOCK_MONOTONIC, for the hand-over; read only where the scene has a time budget.
+    /// `deadline_ns`: CLOCK_MONOTONIC, for the hand-over; 0: none, which only scenes without a time budget allow.
     /// `pixels_done` counts the finished pixels, for a progress display; may be null.
     FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, std::int64_t deadline_ns = 0,
                        Aovs* aovs = nullptr, std::atomic<std::size_t>* pixels_done = nullptr);

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace narpa {
 namespace {
@@ -11,6 +12,7 @@ namespace {
 using BudgetKind = FrameBudget::Kind;
 using Of = PassCosts::Of;
 using Stage = SamplePlan::Stage;
+using Fill = PixelFill::Stage;
 using Tiles = FramePasses::Tiles;
 
 using namespace tuning;
@@ -19,10 +21,10 @@ constexpr double kMaxRaysOfSunlight = 2;  ///< per sample: the camera's and the 
 /// Largest pass: what the account can hold, 2^32, less half a sample for each pixel (SamplePlan::whole).
 constexpr double kMaxSamples = 4e9;
 
-/// A frame begins with one sample per pixel. Sun-only direct lighting traces the pixel centres, plans from them,
-/// and discards them where there are samples; all other lighting takes the first sample of each pixel's sequence
-/// and keeps it. Where direct sunlight is separate, further samples of it are planned from centres that are then
-/// discarded.
+/// A frame begins with one sample per pixel, or with fewer and a reconstruction (pixel_fill.h) if not all fit.
+/// Sun-only direct lighting traces the pixel centres, plans from them, and discards them where there are samples;
+/// all other lighting takes the first sample of each pixel's sequence and keeps it. Where direct sunlight is
+/// separate, further samples of it are planned from centres that are then discarded.
 class BudgetFrame {
 public:
     BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
@@ -50,13 +52,9 @@ public:
             take_first_samples(limit());
         else
             take_first_image();
-        if (account_.step == FrameStep::nothing) {  // the pilot pass is not part of the image
-            account_.rays_discarded += account_.rays;
-            account_.rays = account_.samples = 0;
-        }
         if (passes_.pixels() == 0 && account_.step == FrameStep::one_sample)
             account_.standard_error = 0;  // nothing in view
-        else if (account_.step == FrameStep::one_sample && (!adaptive_ || worth_planning()))
+        else if (account_.step == FrameStep::one_sample && !filled_ && (!adaptive_ || worth_planning()))
             refine();
         show();
         account_.phase_ns = passes_.times();
@@ -64,7 +62,7 @@ public:
     }
 
 private:
-    enum class ToShow : std::uint8_t { nothing, centres, means };
+    enum class ToShow : std::uint8_t { nothing, centres, filled, means };
 
     static FrameSettings with_spp(FrameSettings s, int spp) {
         s.spp = spp;
@@ -85,7 +83,8 @@ private:
     [[nodiscard]] std::uint64_t rays_left() const { return budget_.rays - std::min(budget_.rays, rays_); }
     [[nodiscard]] std::int64_t time_given() const { return budget_.deadline_ns - start_ns_; }
     [[nodiscard]] std::int64_t ns_left() const {
-        return budget_.deadline_ns - slack_ns_ - costs_.expected_ns(Of::show, out_.pixels.size()) - now_ns();
+        return budget_.deadline_ns - slack_ns_ -
+               costs_.expected_ns(filled_ ? Of::fill_show : Of::show, out_.pixels.size()) - now_ns();
     }
     [[nodiscard]] PassLimit limit() const {
         PassLimit l;
@@ -121,18 +120,15 @@ private:
         begin(f);
     }
 
-    bool take_centres(int stride, int made, FrameStep step, const PassLimit& l) {
+    bool take_centres(FrameStep step, const PassLimit& l) {
         change_to(centre_);
-        const PassCount pass = passes_.centres(centre_, stride, made, l);
-        // One pixel in 4 x 4 fills a quarter of a batch, which predicts little of the others' cost.
-        if (stride < 4 || !costs_.known(Of::centres)) costs_.record(Of::centres, pass.samples, pass.wall_ns);
-        if (!account_for(pass, l, made == 0)) return false;
+        const PassCount pass = passes_.centres(centre_, l);
+        costs_.record(Of::centres, pass.samples, pass.wall_ns);
+        if (!account_for(pass, l, true)) return false;
         account_.step = step;
         to_show_ = ToShow::centres;
-        stride_ = stride;
         return true;
     }
-    bool take_centres(int stride, int made, FrameStep step) { return take_centres(stride, made, step, limit()); }
 
     bool take_first_samples(const PassLimit& l, Tiles which = Tiles::all) {
         change_to(sample_);
@@ -148,13 +144,14 @@ private:
         return true;
     }
     bool take_one_sample(const PassLimit& l) {
-        return adaptive_ ? take_centres(1, 0, FrameStep::one_sample, l) : take_first_samples(l);
+        return adaptive_ ? take_centres(FrameStep::one_sample, l) : take_first_samples(l);
     }
 
     [[nodiscard]] bool worth_sunlight() const {
         const auto pixels = static_cast<double>(passes_.pixels());
         switch (budget_.kind) {
-            case BudgetKind::samples: return false;
+            case BudgetKind::samples:
+            case BudgetKind::aim: return false;
             case BudgetKind::passes: return budget_.passes[kSunlightPass] > 0;
             case BudgetKind::rays: return static_cast<double>(budget_.rays) >= kMinRaysForSunlight * pixels;
             case BudgetKind::time:
@@ -166,7 +163,7 @@ private:
     }
     /// Takes the centres, which give a direct-light image to show, and plans the sunlight samples from them.
     bool plan_sunlight() {
-        if (!take_centres(1, 0, FrameStep::no_indirect)) return false;
+        if (!take_centres(FrameStep::no_indirect, limit())) return false;
         const std::int64_t start = now_ns();
         passes_.plan_sunlight(centre_);
         costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
@@ -189,92 +186,170 @@ private:
 
     void take_first_image() {
         switch (budget_.kind) {
-            case BudgetKind::samples: break;
+            case BudgetKind::samples:
+            case BudgetKind::aim: break;
             case BudgetKind::passes: replay_first_image(); break;
             case BudgetKind::time:
-                if (!take_if_affordable(1)) from_coarse_to_fine();
+                if (!take_if_affordable()) fill();
                 break;
             case BudgetKind::rays:
-                if (adaptive_ && 2 * passes_.pixels() <= rays_left())  // the camera's and the Sun's
+                if (adaptive_ && kAllCentresRays * static_cast<double>(passes_.pixels()) <=
+                                     static_cast<double>(rays_left()))  // the camera's and the Sun's
                     take_one_sample(limit());
                 else if (adaptive_ || !take_pilot_and_rest())
-                    from_coarse_to_fine();
+                    fill();
                 break;
         }
     }
 
-    /// Takes a pass that covers all pixels if it is expected to take at most half of the time left; a quarter of
-    /// that time is kept for a coarser pass in case it takes much longer. Stride 1: one sample per pixel.
-    bool take_if_affordable(int stride) {
-        const Of cost = stride == 1 && !adaptive_ ? Of::samples : Of::centres;
-        const auto pieces = passes_.pixels() / static_cast<std::uint64_t>(stride * stride);
+    /// Takes one sample per pixel if that is expected to take at most half of the time left; a quarter of that time
+    /// is kept for a coarser image in case it takes much longer.
+    bool take_if_affordable() {
+        const Of cost = adaptive_ ? Of::centres : Of::samples;
         const std::int64_t left = ns_left();
-        if (!costs_.known(cost) || costs_.expected_ns(cost, pieces) > left / 2) return false;
+        if (!costs_.known(cost) || costs_.expected_ns(cost, passes_.pixels()) > left / 2) return false;
         PassLimit most = limit();
         most.until_ns -= left / 4;
-        return stride == 1 ? take_one_sample(most) : take_centres(stride, 0, FrameStep::coarse_2, most);
+        return take_one_sample(most);
     }
 
     [[nodiscard]] FrameStep recorded_step() const { return static_cast<FrameStep>(budget_.step); }
     void replay_first_image() {
-        switch (recorded_step()) {
-            case FrameStep::refined:
-            case FrameStep::one_sample: take_one_sample({}); break;
-            case FrameStep::no_indirect: take_centres(1, 0, FrameStep::no_indirect); break;
-            case FrameStep::coarse_2: take_centres(2, 0, FrameStep::coarse_2); break;
-            case FrameStep::coarse_4: take_centres(4, 0, FrameStep::coarse_4); break;
-            case FrameStep::nothing: break;
-        }
+        if (recorded_step() == FrameStep::nothing) return;
+        if (recorded_step() != FrameStep::refined && budget_.passes[0] > 0)
+            fill();
+        else if (recorded_step() == FrameStep::no_indirect)
+            take_centres(FrameStep::no_indirect, {});
+        else
+            take_one_sample({});
     }
 
     /// A pilot pass over a sixteenth of the tiles measures the number of rays per sample; the other tiles follow if
-    /// they are nearly certain to fit. Enough rays are kept for a coarse image in case they do not.
+    /// they are nearly certain to fit.
     bool take_pilot_and_rest() {
-        if (passes_.pixels() > rays_left()) return false;
-        PassLimit part = limit();
-        part.rays /= 2;
-        if (!take_first_samples(part, Tiles::pilot)) return false;
+        if (!take_pilot()) return false;
         const std::uint64_t taken = account_.samples;
-        PassLimit rest = limit();
-        rest.rays -= std::min(rest.rays, passes_.pixels() / kPixelsPerCoarseRay);
+        const PassLimit rest = limit();
         if ((rays_each_.sample + rays_each_.path) * static_cast<double>(passes_.pixels() - taken) >
             kMaxPilotPrediction * static_cast<double>(rest.rays))
             return false;
         return take_first_samples(rest, Tiles::all_but_pilot);
     }
+    bool take_pilot() {
+        if (passes_.pixels() / kPilotPart > rays_left()) return false;
+        PassLimit part = limit();
+        part.rays /= 2;
+        return pilot_ = take_first_samples(part, Tiles::pilot);
+    }
 
-    void from_coarse_to_fine() {
+    // Less than one sample per pixel.
+
+    /// Traces the pixels of ever finer lattices, those with the largest contrasts first.
+    void fill() {
         const bool timed = budget_.kind == BudgetKind::time;
-        if (!timed || !take_if_affordable(2)) {
-            // A complete coarse frame is taken even if it is late.
-            if (!take_centres(4, 0, FrameStep::coarse_4, timed ? PassLimit{} : limit())) return;
-            if (!take_centres(2, 4, FrameStep::coarse_2)) return;
-        }
-        if (adaptive_ || has_indirect_)
-            if (!take_centres(1, 2, has_indirect_ ? FrameStep::no_indirect : FrameStep::one_sample)) return;
-        if (adaptive_ || !timed) return;
-        const std::int64_t left = ns_left();
-        if (left <= 0) return;
-        if (costs_.known(Of::samples) && costs_.expected_ns(Of::samples, passes_.pixels()) > left)
-            costs_.decay(Of::samples);
+        if (!adaptive_ && !pilot_ && (budget_.kind != BudgetKind::rays) && paths_fit()) take_pilot();
+        // If even a few paths do not fit, the image shows direct light alone.
+        filled_by_centres_ = adaptive_ || !pilot_;
+        const Frame& f = adaptive_ ? coarse() : pilot_ ? sample_ : centre_;
+        if (adaptive_)
+            frame_ = &f;  // nothing is traced yet
         else
-            take_first_samples(limit());
+            change_to(f);
+        filled_ = true;
+        passes_.begin_fill(pilot_);
+        for (const int stride : {4, 2, 1}) {
+            if (stride == 1 && filled_by_centres_ && !adaptive_) break;
+            const std::int64_t start = now_ns();
+            passes_.plan_fill(stride);
+            if (stride < 4) costs_.record(Of::fill_plan, passes_.pixels(), now_ns() - start);
+            for (Fill from{}; passes_.fill().total() > passes_.fill().total(from);) {
+                const Fill to = stride == 4 ? PixelFill::all() : next_fill(from);
+                const std::uint64_t pixels = passes_.fill().total(to) - passes_.fill().total(from);
+                if (static_cast<double>(pixels) < kMinFill * static_cast<double>(passes_.fill().total())) return;
+                // A complete coarse image is made even if it is late.
+                const PassLimit l = stride == 4 && timed ? PassLimit{} : limit();
+                if (!take_filling(f, from, to, l)) return;
+                account_.passes[fills_++] = static_cast<std::uint32_t>(pixels);
+                from = to;
+            }
+            account_.step = step_of(stride);
+            if (stride == 2 && adaptive_ && refine_sparse()) return;
+        }
+    }
+    /// Sun-only direct lighting: once the contrasts of one pixel in 2 x 2 are known, more samples where these are
+    /// large gain more than the first samples of the pixels where they are small. False: replayed frame without.
+    bool refine_sparse() {
+        if (budget_.kind == BudgetKind::passes && recorded_step() != FrameStep::sparse) return false;
+        passes_.plan_fill(1);
+        const Fill to = budget_.kind == BudgetKind::passes
+                            ? next_fill({})
+                            : passes_.fill().reach({}, kSparseFill * fitting_pixels());
+        const std::uint64_t pixels = passes_.fill().total(to);
+        if (pixels == 0 || !take_filling(coarse_.value(), {}, to, limit())) return true;
+        account_.passes[fills_++] = static_cast<std::uint32_t>(pixels);
+        passes_.reconstruct();
+        refine(FrameStep::sparse);
+        return true;
+    }
+    [[nodiscard]] FrameStep step_of(int stride) const {
+        if (filled_by_centres_ && !adaptive_) return FrameStep::no_indirect;
+        return stride == 1 ? FrameStep::one_sample : stride == 2 ? FrameStep::coarse_2 : FrameStep::coarse_4;
+    }
+    bool take_filling(const Frame& f, Fill from, Fill to, const PassLimit& l) {
+        const PassCount pass = passes_.fill(f, filled_by_centres_, from, to, l);
+        costs_.record(Of::fill, pass.samples, pass.wall_ns);
+        if (!account_for(pass, l, false)) return false;
+        if (account_.step == FrameStep::nothing) account_.step = step_of(4);
+        to_show_ = ToShow::filled;
+        if (!filled_by_centres_) rays_each_ = rays_each(pass);
+        return true;
+    }
+    [[nodiscard]] Fill next_fill(Fill from) const {
+        const PixelFill& plan = passes_.fill();
+        const auto left = static_cast<double>(plan.total() - plan.total(from));
+        double pixels = fitting_pixels();
+        if (budget_.kind == BudgetKind::time) pixels *= from.level == 0 ? kFirstFillTime : kNextFillTime;
+        // The account has room for one more pass: only if that takes all.
+        if (fills_ + 1 >= kMaxPasses && budget_.kind != BudgetKind::passes && pixels < left) return from;
+        return pixels >= left ? PixelFill::all() : plan.reach(from, pixels);
+    }
+    /// Pixels that fit into the rest of the budget.
+    [[nodiscard]] double fitting_pixels() const {
+        switch (budget_.kind) {
+            case BudgetKind::passes: return fills_ < kMaxPasses ? budget_.passes[fills_] : 0;
+            case BudgetKind::rays:
+                return static_cast<double>(rays_left()) /
+                       (filled_by_centres_ ? 2 : (rays_each_.sample + rays_each_.path) / kNextPassRaysOfPaths);
+            case BudgetKind::time: return static_cast<double>(costs_.fitting(Of::fill, ns_left()));
+            default: return 0;
+        }
+    }
+    /// True if a path for one pixel in eight is expected to fit.
+    [[nodiscard]] bool paths_fit() const {
+        if (budget_.kind == BudgetKind::passes) return recorded_step() != FrameStep::no_indirect;
+        return !costs_.known(Of::samples) || costs_.expected_ns(Of::samples, passes_.pixels() / 8) < ns_left();
+    }
+    /// Sun-only direct lighting: the centres as in an image of one sample per pixel.
+    const Frame& coarse() {
+        coarse_settings_ = with_spp(centre_settings_, 1);
+        return coarse_.emplace(
+            make_frame(centre_.render_scene, centre_.at, centre_.camera, centre_.pose, coarse_settings_));
     }
 
     /// Further samples, pass by pass.
-    void refine() {
+    void refine(FrameStep step = FrameStep::refined) {
         if (adaptive_) {
             const std::int64_t start = now_ns();
-            passes_.make_plan(centre_, true);
+            passes_.make_plan(*frame_, true);
             costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
             account_.standard_error = passes_.standard_error();
         }
         if (sunlight_planned_) sunlight_planned_ = mostly_separate_ && two_samples_fit();
         const std::size_t passes = separate_sunlight_ ? kSunlightPass : kMaxPasses;
-        for (std::size_t i = 0; i < passes; ++i) {
+        for (std::size_t i = fills_; i < passes; ++i) {
             const Stage next = sunlight_planned_ ? SamplePlan::whole(wanted(i)) : wanted(i);
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
-            if (samples == 0 && i == 0 && budget_.kind == BudgetKind::time && worth_a_pass())
+            if (samples == 0 && i == fills_ && budget_.kind == BudgetKind::time && worth_a_pass())
                 costs_.decay(Of::samples);
             if (samples == 0) break;
             if (to_show_ == ToShow::means) show();  // an abandoned pass invalidates the means
@@ -282,7 +357,7 @@ private:
             const PassCount pass = passes_.refine(sample_, stage_, next, l);
             costs_.record(Of::samples, pass.samples, pass.wall_ns);
             if (!account_for(pass, l, false)) return;
-            account_.step = FrameStep::refined;
+            account_.step = step;
             account_.passes[i] = static_cast<std::uint32_t>(samples);
             to_show_ = ToShow::means;
             stage_ = next;
@@ -327,17 +402,19 @@ private:
     [[nodiscard]] Stage wanted(std::size_t pass) const {
         const SamplePlan& plan = passes_.plan();
         if (budget_.kind == BudgetKind::passes)
-            return recorded_step() == FrameStep::refined ? plan.reach(stage_, budget_.passes[pass]) : stage_;
+            return recorded_step() == FrameStep::refined || recorded_step() == FrameStep::sparse
+                       ? plan.reach(stage_, budget_.passes[pass])
+                       : stage_;
         if (budget_.kind == BudgetKind::rays) {
             const double left = static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays));
             if (left < kMinRemainder * static_cast<double>(budget_.rays)) return stage_;
-            const double part = adaptive_ ? kNextPassRays : pass == 0 ? kFirstPassRays : kNextPassRaysOfPaths;
+            const double part = adaptive_ ? kNextPassRays : pass == fills_ ? kFirstPassRays : kNextPassRaysOfPaths;
             return plan.reach(stage_, std::min(part * left, kMaxSamples), rays_each_.sample, rays_each_.path);
         }
         if (!worth_a_pass()) return stage_;
         const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_for_samples()));
         return plan.reach(
-            stage_, std::min(std::floor((pass == 0 ? kFirstPassTime : kNextPassTime) * fitting), kMaxSamples));
+            stage_, std::min(std::floor((pass == fills_ ? kFirstPassTime : kNextPassTime) * fitting), kMaxSamples));
     }
     [[nodiscard]] bool worth_a_pass() const {
         return static_cast<double>(ns_for_samples()) >= kMinRemainder * static_cast<double>(time_given());
@@ -360,13 +437,17 @@ private:
     void show() {
         const std::int64_t start = now_ns();
         if (to_show_ == ToShow::nothing) return;
-        if (to_show_ == ToShow::centres) passes_.show_centres(centre_, stride_, out_);
+        if (to_show_ == ToShow::centres) passes_.show_centres(centre_, out_);
+        if (to_show_ == ToShow::filled) {
+            passes_.show_filled(*frame_, filled_by_centres_, out_, variance_);
+            if (account_.step != FrameStep::no_indirect) account_.standard_error = passes_.standard_error();
+        }
         if (to_show_ == ToShow::means) {
-            passes_.show_means(sample_, stage_, out_, variance_);
+            passes_.show_means(sample_, stage_, filled_, out_, variance_);
             account_.standard_error = passes_.standard_error();
         }
+        costs_.record(to_show_ == ToShow::filled ? Of::fill_show : Of::show, out_.pixels.size(), now_ns() - start);
         to_show_ = ToShow::nothing;
-        costs_.record(Of::show, out_.pixels.size(), now_ns() - start);
     }
 
     FramePasses& passes_;
@@ -385,7 +466,12 @@ private:
     RaysEach rays_each_;            ///< of the last pass of samples
     bool sunlight_planned_ = false, mostly_separate_ = false;
     ToShow to_show_ = ToShow::nothing;
-    int stride_ = 1;  ///< of the centres
+    FrameSettings coarse_settings_;
+    std::optional<Frame> coarse_;
+    bool pilot_ = false;   ///< the pilot pass is part of the image
+    bool filled_ = false;  ///< the image has less than one sample per pixel, or had
+    bool filled_by_centres_ = false;
+    std::size_t fills_ = 0;  ///< passes that filled the image
     Stage stage_ = SamplePlan::none();
 };
 

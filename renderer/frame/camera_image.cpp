@@ -12,6 +12,7 @@
 #include "renderer/camera/sun_ghost.h"
 #include "renderer/frame/budgeted_frame.h"
 #include "renderer/frame/camera_rays.h"
+#include "renderer/frame/tuning.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"
 
@@ -116,11 +117,28 @@ struct CameraRenderer::Impl {
                                            : nullptr;
     std::unique_ptr<const SunGhost> ghost = SunGhost::create(render_scene.scene(), camera);
     bool after_light = optics.any() || stars || ghost;
+    std::int64_t expected_ns = 0;  ///< wall time of a frame of FrameSettings::spp; 0: not known
     RadianceImage before_optics{after_light ? camera.width : 0, after_light ? camera.height : 0};
 
     FrameAccount render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,
                         RadianceImage& final_image, Aovs* aovs, std::vector<float>* variance,
                         std::span<const std::uint8_t> chosen);
+
+    /// A frame's budget, with `aim` decided.
+    [[nodiscard]] FrameBudget decided(FrameBudget budget) const {
+        if (budget.kind != FrameBudget::Kind::aim) return budget;
+        const auto left = static_cast<double>(budget.deadline_ns - now_ns());
+        budget.kind = static_cast<double>(expected_ns) <= tuning::kMaxAim * left ? FrameBudget::Kind::samples
+                                                                                 : FrameBudget::Kind::time;
+        return budget;
+    }
+    void learn(const FrameAccount& account, const FrameSettings& settings, std::int64_t wall_ns) {
+        double ns = static_cast<double>(wall_ns);
+        if (account.timed)
+            ns *= static_cast<double>(passes.pixels()) * settings.spp /
+                  static_cast<double>(std::max<std::uint64_t>(account.samples, 1));
+        expected_ns = static_cast<std::int64_t>(ns);
+    }
 
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
         optics.apply(before_optics, out);
@@ -146,10 +164,13 @@ FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose,
     return impl_->render(at, pose, settings, out, nullptr, &variance, chosen);
 }
 
-FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose& pose,
-                                          const FrameSettings& settings, RadianceImage& final_image, Aovs* aovs,
-                                          std::vector<float>* variance, std::span<const std::uint8_t> chosen) {
-    assert(final_image.width == camera.width && final_image.height == camera.height && settings.spp >= 1);
+FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& wanted,
+                                          RadianceImage& final_image, Aovs* aovs, std::vector<float>* variance,
+                                          std::span<const std::uint8_t> chosen) {
+    assert(final_image.width == camera.width && final_image.height == camera.height && wanted.spp >= 1);
+    const std::int64_t start_ns = now_ns();
+    FrameSettings settings = wanted;
+    settings.budget = decided(wanted.budget);
     RadianceImage& out = after_light ? before_optics : final_image;
     const bool uniform = settings.budget.kind == FrameBudget::Kind::samples;
     FrameAccount account;
@@ -163,6 +184,8 @@ FrameAccount CameraRenderer::Impl::render(const BodyPoses& at, const CameraPose&
     }
     if (!uniform)
         account = render_within_budget(passes, costs, render_scene, camera, at, pose, settings, out, variance);
+    account.timed = settings.budget.kind == FrameBudget::Kind::time;
+    if ((uniform || account.timed) && aovs == nullptr) learn(account, settings, now_ns() - start_ns);
     for (const std::uint32_t pixel : unseen) out.pixels[pixel] = {};
     if (after_light) apply_optics(at, pose, final_image);
     return account;

@@ -39,6 +39,8 @@ public:
     /// Adds a tile with any number of samples per pixel; a pixel without any shows its centre. `contrast`: null if
     /// all have two samples or more.
     void add_tile(const TileContrast* contrast, const PerPixel<PixelMeans>& means) noexcept;
+    /// Adds a pixel's squared error.
+    void add_squared(double error) noexcept { from_contrasts_ += error; }
     /// Adds a pixel of two samples or more.
     void add(const PixelMeans& means) noexcept;
     FrameError& operator+=(const FrameError& b) noexcept;

@@ -19,11 +19,6 @@ using namespace tuning;
 /// Sums are formed per chunk, so that they do not depend on the threads.
 constexpr std::size_t kChunk = kTilesPerTask;
 
-/// The pixel that represents this one.
-int representative(int x, int width, int stride) {
-    return stride == 1 ? x : std::min(x - x % stride + 1, width - 1);
-}
-
 /// Finds tiles that may show light although no body is in view: the Sun's disc, area lights, a non-uniform
 /// background, a medium.
 class EmittersInView {
@@ -240,12 +235,12 @@ void FramePasses::show_samples(Worker& w, const Tile& t, std::span<const std::ui
 void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) {
     prefetch_pixels(t, out);
     if (fills_g_buffer(t.index)) {
-        w.centres(t, out.width, out.height, 1, 0, g_buffer_);
+        w.centres(t, out.width, kAllPlaces, g_buffer_);
         const GBufferTile& centres = g_buffer_.tile(t.index);
         return put_pixels(t, centres.r, centres.g, centres.b, out);
     }
     PerPixel<float> r, g, b;
-    w.centres(t, out.width, out.height, 1, 0,
+    w.centres(t, out.width, kAllPlaces,
               [&](const SampleBatch& batch, const TracedRays&, const BatchRadiance& light) {
                   put_in_tile(w.f, light, batch.place, batch.samples.n, r, g, b);
               });
@@ -279,23 +274,62 @@ void FramePasses::estimate_centres(const Frame& f) {
     });
 }
 
-PassCount FramePasses::centres(const Frame& f, int stride, int made, const PassLimit& limit) {
-    assert(made == 0 || made == 2 * stride);
-    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
-        w.centres(t, camera_.width, camera_.height, stride, made, g_buffer_);
-    });
+PassCount FramePasses::centres(const Frame& f, const PassLimit& limit) {
+    return over_tiles(f, Sums::counts, limit,
+                      [&](Worker& w, const Tile& t) { w.centres(t, camera_.width, kAllPlaces, g_buffer_); });
 }
 
-void FramePasses::show_centres(const Frame& f, int stride, RadianceImage& out) {
+void FramePasses::show_centres(const Frame& f, RadianceImage& out) {
     fill_background(out);
     over_tiles(f, Sums::counts, {}, [&](Worker&, const Tile& t) {
         const GBufferTile& centres = g_buffer_.tile(t.index);
-        t.each_pixel([&](int x, int y, std::size_t) {
-            const int from_x = representative(x, out.width, stride), from_y = representative(y, out.height, stride);
-            out.pixels[index_of(x, y, out.width)] =
-                radiance_at(centres, place_in_tile(from_x % kTile, from_y % kTile));
-        });
+        put_pixels(t, centres.r, centres.g, centres.b, out);
         add_subpixel_light(f, t, out, nullptr);
+    });
+}
+
+void FramePasses::begin_fill(bool with_pilot) {
+    if (!fill_) fill_.emplace(g_buffer_);
+    fill_->begin(tiles_);
+    if (!with_pilot) return;
+    for (const std::uint32_t i : tiles_)
+        if (is_pilot_tile(tile(i).x / kTile, tile(i).y / kTile)) fill_->set_traced(i);
+}
+
+PassCount FramePasses::fill(const Frame& f, bool centres, PixelFill::Stage from, PixelFill::Stage to,
+                            const PassLimit& limit) {
+    const PassCount count = over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        const std::uint64_t places = fill_->between(t.index, from, to);
+        if (places == 0) return;
+        if (centres) return w.centres(t, camera_.width, places, g_buffer_);
+        const auto none = [](std::size_t) { return 0u; };
+        const auto one = [places](std::size_t at) { return static_cast<std::uint32_t>(places >> at & 1); };
+        w.samples(t, camera_.width, none, one,
+                  [&](const SampleBatch& b, const TracedRays& p, const BatchRadiance& light) {
+                      g_buffer_.store(f, p, light, b.place, t.index);
+                  });
+    });
+    if (count.complete) fill_->take(g_buffer_, tiles_, from, to);
+    return count;
+}
+
+void FramePasses::show_filled(const Frame& f, bool centres, RadianceImage& out, std::vector<float>* variance) {
+    fill_background(out);
+    reconstruct();
+    over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
+        const GBufferTile& pixels = g_buffer_.tile(t.index);
+        put_pixels(t, pixels.r, pixels.g, pixels.b, out);
+        TileContrast contrast;
+        if (centres) g_buffer_.contrast(f, t.index, contrast);
+        t.each_pixel([&](int x, int y, std::size_t at) {
+            const bool traced = fill_->is_traced(t.index, at);
+            const double squared =
+                centres ? (traced ? static_cast<double>(contrast.centre[at]) : fill_->error_of(t.index, at))
+                        : (traced ? kNoiseOfTraced : kNoiseOfFilled) * fill_->error_of(t.index, at);
+            w.error.add_squared(squared);
+            if (variance != nullptr) (*variance)[index_of(x, y, out.width)] = static_cast<float>(squared);
+        });
+        add_subpixel_light(f, t, out, variance);
     });
 }
 
@@ -351,7 +385,7 @@ PassCount FramePasses::refine_sunlight(const Frame& f, std::uint32_t each, Sampl
     });
 }
 
-void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out,
+void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, bool filled, RadianceImage& out,
                              std::vector<float>* variance) {
     assert(plan_ && (variance == nullptr || variance->size() == out.pixels.size()));
     fill_background(out);
@@ -369,6 +403,13 @@ void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, RadianceIm
         const TileContrast& contrast = uniform ? of_samples : plan_->contrast(t.index);
         w.error.add_tile(uniform && !needs_contrast ? nullptr : &contrast, means);
         if (variance != nullptr) put_variances(t, means, contrast, out.width, *variance);
+        if (filled)
+            t.each_pixel([&](int x, int y, std::size_t at) {
+                if (means[at].count() > 0 || fill_->is_traced(t.index, at)) return;
+                const double squared = fill_->error_of(t.index, at);
+                w.error.add_squared(squared - static_cast<double>(contrast.centre[at]));
+                if (variance != nullptr) (*variance)[index_of(x, y, out.width)] = static_cast<float>(squared);
+            });
         add_subpixel_light(f, t, out, variance);
     });
 }

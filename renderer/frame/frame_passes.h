@@ -13,6 +13,7 @@
 
 #include "renderer/frame/frame_error.h"
 #include "renderer/frame/g_buffer.h"
+#include "renderer/frame/pixel_fill.h"
 #include "renderer/frame/sample_plan.h"
 #include "renderer/frame/tile_culling.h"
 #include "renderer/image/radiance_image.h"
@@ -58,10 +59,22 @@ public:
 
     /// Tiles that a pass covers; those of the pilot pass are a sixteenth, evenly spread.
     enum class Tiles : std::uint8_t { all, pilot, all_but_pilot };
-    /// Traces the centres of the pixels that represent squares of `stride` (1, 2 or 4) pixels, except those of an
-    /// earlier pass of stride `made` (0: none).
-    PassCount centres(const Frame& f, int stride, int made, const PassLimit& limit);
-    void show_centres(const Frame& f, int stride, RadianceImage& out);
+    /// Traces the centres of all pixels.
+    PassCount centres(const Frame& f, const PassLimit& limit);
+    void show_centres(const Frame& f, RadianceImage& out);
+
+    /// Starts an image with less than one sample per pixel (pixel_fill.h). `with_pilot`: the tiles of the pilot
+    /// pass have a sample of each pixel already.
+    void begin_fill(bool with_pilot);
+    void plan_fill(int stride) { fill_->plan(g_buffer_, tiles_, stride); }
+    [[nodiscard]] const PixelFill& fill() const noexcept { return *fill_; }
+    /// Traces the planned pixels between two stages: their centres, or the first samples of their sequences.
+    PassCount fill(const Frame& f, bool centres, PixelFill::Stage from, PixelFill::Stage to,
+                   const PassLimit& limit);
+    /// Reconstructs the pixels without a sample.
+    void reconstruct() { fill_->reconstruct(g_buffer_, tiles_); }
+    /// The same, and writes the image.
+    void show_filled(const Frame& f, bool centres, RadianceImage& out, std::vector<float>* variance);
 
     /// Makes an adaptive plan from the contrasts of the centres, or a uniform plan.
     void make_plan(const Frame& f, bool adaptive);
@@ -78,8 +91,10 @@ public:
     /// that plan.
     PassCount refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to, const PassLimit& limit);
 
-    /// Writes the pixels' means at a stage of the plan to the image.
-    void show_means(const Frame& f, SamplePlan::Stage stage, RadianceImage& out, std::vector<float>* variance);
+    /// Writes the pixels' means at a stage of the plan to the image. `filled`: pixels without a sample are
+    /// reconstructed.
+    void show_means(const Frame& f, SamplePlan::Stage stage, bool filled, RadianceImage& out,
+                    std::vector<float>* variance);
 
     /// Error of the image last written by `uniform` or `show_means`, or of the centres that the plan was made from.
     [[nodiscard]] double standard_error() const noexcept;
@@ -114,6 +129,7 @@ private:
 
     std::optional<SamplePlan> plan_, sunlight_plan_;  ///< allocated when first needed, as is means_
     std::vector<PerPixel<PixelMeans>> means_;
+    std::optional<PixelFill> fill_;  ///< likewise
 
     // Tiles that still hold the background in the image that was last written, and that image's pixels and
     // background.

@@ -30,10 +30,11 @@ inline constexpr std::size_t kSunlightPass = kMaxPasses - 1;
 enum class FrameStep : std::uint8_t {
     refined,      ///< more samples, or spp of them
     one_sample,   ///< one sample of each pixel: its centre, or the first of its sequence
-    no_indirect,  ///< the pixels' centres, with direct light only although the scene asks for paths
-    coarse_2,     ///< one pixel in 2 x 2, with direct light only
-    coarse_4,     ///< one pixel in 4 x 4
+    no_indirect,  ///< centres of pixels, all or some, with direct light only although the scene asks for paths
+    coarse_2,     ///< one pixel in 2 x 2 and more; the others are reconstructed
+    coarse_4,     ///< one pixel in 4 x 4 and more; the others are reconstructed
     nothing,      ///< no pass: the image is unchanged
+    sparse,       ///< between coarse_2 and one_sample, and further samples where they matter most
 };
 
 struct FrameBudget {
@@ -41,6 +42,7 @@ struct FrameBudget {
         samples,  ///< FrameSettings::spp for each pixel, in one pass
         rays,     ///< at most this many rays, those of subpixel bodies not counted; same bytes under any load
         time,     ///< the radiance is complete at the deadline
+        aim,      ///< as `samples` if these are expected by the deadline, else as `time`
         passes,   ///< the passes of an account: repeats that frame
     };
     Kind kind = Kind::samples;
@@ -52,6 +54,7 @@ struct FrameBudget {
 
 struct FrameAccount {
     FrameStep step = FrameStep::refined;
+    bool timed = false;         ///< the clock chose the passes
     std::uint64_t samples = 0;  ///< camera samples of the passes that count
     std::uint64_t rays = 0;     ///< of all kinds except subpixel bodies', of the passes that count
     std::uint64_t rays_discarded = 0;

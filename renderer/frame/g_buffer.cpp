@@ -291,7 +291,6 @@ NARPA_EACH_ISA void measure_contrasts(const GBuffer::Around& a, TileContrast& ou
 
 }  // namespace
 
-/// True if the tile and its four neighbours show only the background.
 bool GBuffer::in_empty_space(std::size_t tile) const noexcept {
     const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
     const auto empty = [&](std::size_t other) { return known_[other] != Known::something; };

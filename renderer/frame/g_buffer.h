@@ -108,6 +108,11 @@ public:
     void begin_frame(const Rgb& background);
     void set_traced(std::size_t tile) noexcept { known_[tile] = Known::background; }
     [[nodiscard]] bool is_traced(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
+    [[nodiscard]] const Rgb& background() const noexcept { return background_; }
+    /// The tile shows more than the background.
+    void set_something(std::size_t tile) noexcept { known_[tile] = Known::something; }
+    /// True if the tile and its four neighbours show only the background.
+    [[nodiscard]] bool in_empty_space(std::size_t tile) const noexcept;
 
     /// Stores one sample of each of a batch's pixels. `place`: index of each lane's pixel in the tile.
     void store(const Frame& f, const TracedRays& p, const BatchRadiance& light, const Lanes<std::uint8_t>& place,
@@ -123,7 +128,6 @@ private:
     void gather(const Frame& f, std::size_t tile, Around& a) const noexcept;
     [[nodiscard]] bool shows_background(const Frame& f, const TracedRays& p,
                                         const BatchRadiance& light) const noexcept;
-    [[nodiscard]] bool in_empty_space(std::size_t tile) const noexcept;
 
     int width_, height_, tiles_x_, tiles_y_;
     Rgb background_{};

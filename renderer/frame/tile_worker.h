@@ -21,11 +21,7 @@ namespace narpa {
 /// centres decide how many samples a pixel gets.
 inline constexpr std::uint32_t kFirstCentre = 0x40000000u;
 inline constexpr int kBlock = 4;
-
-/// True for the pixel that represents a square of `stride` pixels: the second, or the last at the image's edge.
-inline bool represents(int x, int width, int stride) {
-    return stride == 1 || x % stride == 1 || (x % stride == 0 && x == width - 1);
-}
+inline constexpr std::uint64_t kAllPlaces = ~std::uint64_t{0};  ///< of a tile
 
 struct FramePasses::Tile {
     std::uint32_t index;
@@ -115,32 +111,27 @@ public:
         }
     }
 
-    /// Traces the centres of the pixels that represent squares of `stride` pixels, except those of an earlier pass
-    /// of stride `made` (0: none).
+    /// Traces the centres of pixels: a bit of `places` for each place in the tile.
     template <class Accumulate>
-    void centres(const Tile& tile, int width, int height, int stride, int made, Accumulate&& accumulate) {
-        assert(stride == 1 || stride == 2 || stride == 4);
+    void centres(const Tile& tile, int width, std::uint64_t places, Accumulate&& accumulate) {
         const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstCentre;
         const auto place = [&](auto&& add, auto&& add_block) {
-            if (stride == 1 && made == 0 && tile.whole()) {
+            if (places == kAllPlaces && tile.whole()) {
                 for (int block = 0; block < 4; ++block)
                     add_block([&](SampleBatch& b) { put_block(tile, block, first, width, b); });
                 return;
             }
             tile.each_pixel([&](int x, int y, std::size_t at) {
-                if (!represents(x, width, stride) || !represents(y, height, stride)) return;
-                if (made > 0 && represents(x, width, made) && represents(y, height, made)) return;
-                add(x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0);
+                if ((places >> at & 1) != 0) add(x, y, at, first + static_cast<std::uint32_t>(y * width + x), 0);
             });
         };
         trace(tile, true, place, accumulate);
     }
     /// The same, stored in the G-buffer.
-    void centres(const Tile& tile, int width, int height, int stride, int made, GBuffer& g_buffer) {
-        centres(tile, width, height, stride, made,
-                [&](const SampleBatch& b, const TracedRays& p, const BatchRadiance& l) {
-                    g_buffer.store(f, p, l, b.place, tile.index);
-                });
+    void centres(const Tile& tile, int width, std::uint64_t places, GBuffer& g_buffer) {
+        centres(tile, width, places, [&](const SampleBatch& b, const TracedRays& p, const BatchRadiance& l) {
+            g_buffer.store(f, p, l, b.place, tile.index);
+        });
     }
 
 private:

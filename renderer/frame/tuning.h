@@ -24,15 +24,17 @@ inline constexpr double kSunlightPassTime = 0.7;
 /// Fractions of the remaining rays. With Sun-only direct lighting the number of samples predicts the number of rays
 /// almost exactly (docking); with paths it varies by a tenth from one pass to the next (craft-paths, cornell).
 inline constexpr double kFirstPassRays = 0.85, kNextPassRays = 0.96, kNextPassRaysOfPaths = 0.9;
+/// A frame of a fixed number of samples is expected to take its last time, or that of as many samples in a frame
+/// that the clock has ended; it may be expected to take this part of the time left.
+inline constexpr double kMaxAim = 0.75;
 /// A remainder below this fraction of the budget is not worth another pass.
 inline constexpr double kMinRemainder = 0.05;
 
 /// Largest fraction of the remaining rays that one sample per pixel may be expected to take; the expectation comes
 /// from the pilot pass, a sixteenth of the tiles. craft-paths.
 inline constexpr double kMaxPilotPrediction = 0.85;
-/// A coarse image takes two rays for one pixel in 4 x 4, and more for those at the edges: a ray for this many
-/// pixels.
-inline constexpr std::uint64_t kPixelsPerCoarseRay = 4;
+/// The pilot pass is this part of the tiles.
+inline constexpr std::uint64_t kPilotPart = 16;
 
 /// Separate direct sunlight gets samples of its own, with this fraction of the budget, if the budget has this many
 /// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate. craft-paths at 256 x
@@ -48,8 +50,9 @@ inline constexpr std::int64_t kMinSlack_ns = 300'000, kSlackPart = 40;
 
 // Prediction of a pass's wall time (pass_costs.h), runs of docking beside other load.
 
-/// ns per pixel or sample of each kind of pass before any measurement: centres, plan, samples, sunlight, show.
-inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10};
+/// ns per pixel or sample of each kind of pass before any measurement: centres, plan, samples, sunlight, show;
+/// plan, pixels and show of a filled image.
+inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10, 30, 200, 60};
 /// After a skipped pass the estimate falls by this factor, to no less than this fraction of the last measurement.
 inline constexpr double kSkippedDecay = 0.95, kMinDecayed = 0.25;
 /// Weight of a new measurement, which counts as within this factor of the estimate.
@@ -86,6 +89,27 @@ inline constexpr float kHiddenVariance = 0.02f;
 /// Exponent of the variance of edges, which falls as n^-1.5, beside that of noise, which falls as 1/n: the weights
 /// are the powers 2/5 and 1/2 of the variances of one sample.
 inline constexpr double kEdgePower = 0.8;
+
+// Pixels that are not traced (pixel_fill.h): docking at 0, 25 and 50 s.
+
+/// Hits lie on one side of a silhouette if their depths differ by no more than this part of the nearer one: on one
+/// surface, and on two.
+inline constexpr float kOneSurfaceGap = 0.05f, kOneSideGap = 0.005f;
+/// A silhouette counts as a contrast of at least this part of the largest.
+inline constexpr float kSilhouetteContrast = 1.0f / 64;
+/// Fewer comparisons than this say nothing about an octave of contrast; then the squared error is this part of the
+/// squared contrast.
+inline constexpr double kMinComparisons = 30, kFillErrorOfContrast = 0.2;
+/// Where samples are noisy, so are the neighbours with which they are compared: the squared error of a traced and
+/// of a reconstructed pixel, as parts of the mean squared difference. cornell.
+inline constexpr double kNoiseOfTraced = 0.6, kNoiseOfFilled = 0.4;
+/// Sun-only direct lighting: this part of what is left after one pixel in 2 x 2 goes to further pixels, the rest to
+/// further samples; with this many rays per pixel, all centres are traced instead.
+inline constexpr double kSparseFill = 0.5, kAllCentresRays = 3;
+/// A pass is worth its start if it traces this part of a lattice.
+inline constexpr double kMinFill = 0.005;
+/// Parts of the remaining time for the next pixels, and for those after them.
+inline constexpr double kFirstFillTime = 0.6, kNextFillTime = 0.85;
 
 // Estimates of variance.
 

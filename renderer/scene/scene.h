@@ -147,6 +147,7 @@ struct RenderSettings {
     int spp = 1;                    ///< samples per pixel where there is no budget
     std::int64_t budget_ns = 0;     ///< > 0: hand-over deadline of a frame, from the end of its exposure
     std::uint64_t budget_rays = 0;  ///< > 0: a frame takes at most so many rays of all kinds
+    bool keep_deadline = true;      ///< in real time: a frame takes less than `spp` rather than be late
     std::uint64_t seed = 0;
     double stale_after_s = 0.5;       ///< commands older than this: the body holds still and is reported stale
     double command_ahead_max_s = 60;  ///< commands for a time further ahead are refused

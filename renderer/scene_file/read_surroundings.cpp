@@ -23,6 +23,7 @@ constexpr TableKey kRenderRows[]{
     {"spp", rows::integer(1, 65535)},
     {"budget_ms", rows::number({.low = 0.001, .high = 1e6})},
     {"budget_rays", rows::integer(1, 1'000'000'000'000)},
+    {"keep_deadline", rows::boolean()},
     {"seed", rows::integer(0, INT64_MAX)},
     {"stale_after_s", rows::number(kPositive)},
     // Time stamps on the bus are unambiguous within 39 h.
@@ -93,6 +94,7 @@ void read_render(TableReader& root, Scene& scene) {
         table->refuse("max_depth", "belongs to method = \"path\", and this is \"direct\"");
     table->read("max_depth", render.max_depth);
     read_budget(*table, render);
+    table->read("keep_deadline", render.keep_deadline);
     table->read("seed", render.seed);
     table->read("stale_after_s", render.stale_after_s);
     table->read("command_ahead_max_s", render.command_ahead_max_s);

@@ -17,18 +17,14 @@ constexpr TableKey kNavigationGateRows[]{
     {"position_m", rows::number(kPositive)},
     {"attitude_deg", rows::number(kPositive)},
 };
-constexpr TableKey kContactRows[]{
-    {"closing_min_m_s", rows::number(kNotNegative)},      {"closing_max_m_s", rows::number(kNotNegative)},
-    {"lateral_rate_m_s", rows::number(kNotNegative)},     {"lateral_m", rows::number(kNotNegative)},
-    {"pitch_yaw_deg", rows::number(kNotNegative)},        {"roll_deg", rows::number(kNotNegative)},
-    {"pitch_yaw_rate_deg_s", rows::number(kNotNegative)}, {"roll_rate_deg_s", rows::number(kNotNegative)},
-};
-constexpr TableKey kLandingRows[]{
-    {"vertical_m_s", rows::number(kNotNegative)}, {"horizontal_m_s", rows::number(kNotNegative)},
-    {"tilt_deg", rows::number(kNotNegative)},     {"rate_deg_s", rows::number(kNotNegative)},
-    {"from_site_m", rows::number(kNotNegative)},  {"slope_deg", rows::number(kNotNegative)},
-    {"step_m", rows::number(kNotNegative)},
-};
+constexpr KeyValue kLimit = rows::number(kNotNegative);
+constexpr TableKey kContactRows[]{{"closing_min_m_s", kLimit},      {"closing_max_m_s", kLimit},
+                                  {"lateral_rate_m_s", kLimit},     {"lateral_m", kLimit},
+                                  {"pitch_yaw_deg", kLimit},        {"roll_deg", kLimit},
+                                  {"pitch_yaw_rate_deg_s", kLimit}, {"roll_rate_deg_s", kLimit}};
+constexpr TableKey kLandingRows[]{{"vertical_m_s", kLimit}, {"horizontal_m_s", kLimit}, {"tilt_deg", kLimit},
+                                  {"rate_deg_s", kLimit},   {"from_site_m", kLimit},    {"slope_deg", kLimit},
+                                  {"step_m", kLimit}};
 constexpr TableKeys kCorridorKeys{.rows = kCorridorRows}, kNavigationGateKeys{.rows = kNavigationGateRows},
     kContactKeys{.rows = kContactRows}, kLandingKeys{.rows = kLandingRows};
 constexpr TableKey kGatesRows[]{

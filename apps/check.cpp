@@ -485,7 +485,8 @@ struct SchemaRow {
     std::string name;
     const TableKeys& keys;
 };
-const std::array<SchemaRow, 2> kSchemas{{{"scene", kSceneFileKeys}, {"lidar", kLidarDescriptionKeys}}};
+const std::array<SchemaRow, 3> kSchemas{
+    {{"scene", kSceneFileKeys}, {"lidar", kLidarDescriptionKeys}, {"scenario", rehearsal::kScenarioFileKeys}}};
 
 Outcome print_schema(const std::string& name) {
     const auto row = std::ranges::find(kSchemas, name, &SchemaRow::name);

@@ -29,7 +29,54 @@ constexpr std::array<FaultKind, 6> kKinds{{
      [](const Fault&, FaultEffects& e) { e.throttle_stuck = true; }},
 }};
 
+constexpr TableKey kFaultRows[]{
+    {"kind", rows::kind(), "what goes wrong"},
+    {"from_s", rows::number(kNotNegative)},
+    {"until_s", rows::number(kPositive)},
+};
+constexpr TableKey kOwnRows[]{
+    {"axis", rows::choice<kThrusterGroupNames>(), "\"+fx\", \"-fx\" ... \"+tz\", \"-tz\": a group of thrusters",
+     "belongs to faults of thrusters"},
+    {"value", rows::vec3({.low = -360, .high = 360}), "[x, y, z]", "belongs to attitude_bias and target_rate"},
+};
+
+std::vector<TableKind> kinds_of_faults() {
+    std::vector<TableKind> kinds;
+    for (const FaultKind& kind : kKinds) {
+        kinds.push_back({kind.name});
+        for (const TableKey& row : kOwnRows)
+            if (row.name == kind.key) kinds.back().rows = {&row, 1};
+    }
+    return kinds;
+}
+
+Fault read_fault(TableReader& table, const Scenario& s) {
+    Fault fault;
+    fault.kind = &kKinds[table.kind().value_or(0)];
+    table.read("from_s", fault.from_s);
+    table.read("until_s", fault.until_s);
+    if (!(fault.from_s < s.duration_s))
+        table.fail("from_s", fmt::format("is {:g}, expected less than duration_s of [scenario], {:g}", fault.from_s,
+                                         s.duration_s));
+    if (!(fault.until_s > fault.from_s))
+        table.fail("until_s", fmt::format("is {:g}, expected more than from_s, {:g}", fault.until_s, fault.from_s));
+    if (fault.kind->needs_engine && !s.engine)
+        table.fail("kind", "there is no throttle, expected a table [engine]");
+    if (fault.kind->key == "axis") {
+        table.read("axis", fault.axis);
+        if (table.has("axis") && std::ranges::find(kThrusterGroupNames, fault.axis) == kThrusterGroupNames.end())
+            table.fail("axis", fmt::format("\"{}\" is no group of thrusters, expected one of {}", fault.axis,
+                                           fmt::join(kThrusterGroupNames, ", ")));
+    } else if (fault.kind->key == "value") {
+        table.read("value", fault.value);
+    }
+    table.finish();
+    return fault;
+}
+
 }  // namespace
+
+constinit const TableKeys kFaultKeys{.rows = kFaultRows, .kinds = kinds_of_faults};
 
 std::span<const FaultKind> fault_kinds() {
     return kKinds;
@@ -61,38 +108,8 @@ std::int64_t next_change_ns(std::span<const Fault> faults, std::int64_t t_ns) {
     return next;
 }
 
-Fault read_fault(TableReader& table, bool has_engine, double duration_s) {
-    std::vector<std::pair<std::string_view, const FaultKind*>> names;
-    for (const FaultKind& kind : kKinds) names.emplace_back(kind.name, &kind);
-    Fault fault;
-    table.require("kind", "what goes wrong");
-    fault.kind = table.choice<const FaultKind*>("kind", names).value_or(names.front().second);
-    read(table, "from_s", fault.from_s, kNotNegative);
-    read(table, "until_s", fault.until_s, kPositive);
-    if (!(fault.from_s < duration_s))
-        table.fail("from_s", fmt::format("is {:g}, expected less than duration_s of [scenario], {:g}", fault.from_s,
-                                         duration_s));
-    if (!(fault.until_s > fault.from_s))
-        table.fail("until_s", fmt::format("is {:g}, expected more than from_s, {:g}", fault.until_s, fault.from_s));
-    if (fault.kind->needs_engine && !has_engine)
-        table.fail("kind", "there is no throttle, expected a table [engine]");
-    if (fault.kind->key == "axis") {
-        table.require("axis", "\"+fx\", \"-fx\" ... \"+tz\", \"-tz\": a group of thrusters");
-        fault.axis = table.text("axis").value_or("");
-        if (table.has("axis") && std::ranges::find(kThrusterGroupNames, fault.axis) == kThrusterGroupNames.end())
-            table.fail("axis", fmt::format("\"{}\" is no group of thrusters, expected one of {}", fault.axis,
-                                           fmt::join(kThrusterGroupNames, ", ")));
-    } else {
-        table.refuse("axis", "belongs to faults of thrusters");
-    }
-    if (fault.kind->key == "value") {
-        table.require("value", "[x, y, z]");
-        fault.value = table.vec3("value", {.low = -360, .high = 360}).value_or(Vec3{});
-    } else {
-        table.refuse("value", "belongs to attitude_bias and target_rate");
-    }
-    table.finish();
-    return fault;
+void read_faults(TableReader& root, Scenario& s) {
+    for (TableReader& table : root.tables("fault")) s.faults.push_back(read_fault(table, s));
 }
 
 }  // namespace narpa::rehearsal

@@ -12,10 +12,6 @@
 
 #include "base/pose.h"
 
-namespace narpa {
-class TableReader;
-}
-
 namespace narpa::rehearsal {
 
 inline constexpr std::array<std::string_view, 12> kThrusterGroupNames{"+fx", "-fx", "+fy", "-fy", "+fz", "-fz",
@@ -63,8 +59,5 @@ struct Fault {
 [[nodiscard]] FaultEffects effects_at(std::span<const Fault> faults, std::int64_t t_ns);
 /// The next start or end of a fault after t_ns; the largest time if there is none.
 [[nodiscard]] std::int64_t next_change_ns(std::span<const Fault> faults, std::int64_t t_ns);
-
-/// Reads a table [[fault]].
-[[nodiscard]] Fault read_fault(TableReader& table, bool has_engine, double duration_s);
 
 }  // namespace narpa::rehearsal

@@ -27,6 +27,7 @@
 #include "rehearsal/contact/port_state.h"
 #include "rehearsal/orbit/orbit.h"
 #include "rehearsal/scenario/fault.h"
+#include "renderer/keys/keys.h"
 
 namespace narpa::rehearsal {
 
@@ -196,6 +197,9 @@ struct Scenario {
     /// legs_duration_s(), at most duration_s: for a progress display.
     [[nodiscard]] double nominal_duration_s() const { return std::min(legs_duration_s(), duration_s); }
 };
+
+/// The tables of a scenario file.
+extern const TableKeys kScenarioFileKeys;
 
 /// Errors name file, line, column, what is wrong and what was expected.
 Result<Scenario> read_scenario(const std::string& path);

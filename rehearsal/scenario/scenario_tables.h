@@ -1,29 +1,28 @@
-/// rehearsal/scenario/scenario_tables.h - values and tables of scenario files.
+/// rehearsal/scenario/scenario_tables.h - the tables of scenario files: their keys, and the functions that read
+/// them.
 #pragma once
-
-#include <string_view>
 
 #include "rehearsal/scenario/scenario.h"
 #include "renderer/keys/toml_reader.h"
+#include "renderer/scene/scene.h"
 
 namespace narpa::rehearsal {
 
-/// Sets `value` if the table has the key.
-inline void read(TableReader& table, std::string_view key, double& value, const Range& range = kAnyNumber) {
-    value = table.number(key, range).value_or(value);
-}
-inline void read(TableReader& table, std::string_view key, Vec3& value, const Range& range = kAnyNumber) {
-    value = table.vec3(key, range).value_or(value);
-}
-inline void read(TableReader& table, std::string_view key, bool& value) {
-    value = table.boolean(key).value_or(value);
-}
+inline constexpr double kLongest_s = 1e6;
 
-// The tables of landings.
+extern const TableKeys kOrbitKeys, kTargetKeys, kChaserKeys, kAttractorKeys, kStartKeys;
+extern const TableKeys kThrustersKeys, kEngineKeys, kLandingGearKeys, kAttitudeSensorKeys;
+extern const TableKeys kLegKeys, kNavigationKeys, kModelErrorKeys, kControlKeys;
+extern const TableKeys kFaultKeys, kGatesKeys;
 
-[[nodiscard]] Engine read_engine(TableReader& table);
-[[nodiscard]] LandingGear read_gear(TableReader& table, const Scenario& s);
-/// `gates` may lack the table.
-void read_landing(TableReader& gates, const Scenario& s, Gates& out);
+/// Reads [orbit], [target], [chaser], [attractor] and [start].
+void read_bodies(TableReader& root, Scenario& s, const Scene& scene);
+/// Reads [thrusters], [engine], [landing_gear] and [attitude_sensor].
+void read_equipment(TableReader& root, Scenario& s);
+/// Reads [[leg]], [navigation], [model_error] and [control].
+void read_flight(TableReader& root, Scenario& s, const Scene& scene);
+void read_faults(TableReader& root, Scenario& s);
+/// Reads [gates] of a scenario that has legs.
+void read_gates(TableReader& root, Scenario& s);
 
 }  // namespace narpa::rehearsal

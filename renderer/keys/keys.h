@@ -70,6 +70,7 @@ struct TableKey {
     KeyValue value;
     std::string_view
         required{};  ///< completes "[sun] has no "direction", expected ..."; empty: the key may be absent
+    std::string_view refusal{};  ///< by kinds of the table without this key; empty: names the kinds with it
 };
 
 /// The keys that a table has when its key of type `kind` holds this word, beside those of all kinds.

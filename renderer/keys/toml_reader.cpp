@@ -154,13 +154,14 @@ std::optional<std::size_t> TableReader::kind() {
     const TableKind& own = kinds[static_cast<std::size_t>(kind_)];
     for (const auto& [node_key, value] : *table_) {
         if (keys_->find(node_key.str(), kind_)) continue;
-        std::string owners;
+        const TableKey* const others = keys_->find(node_key.str());
+        if (!others) continue;
+        std::string why(others->refusal), owners;
         for (const TableKind& k : kinds)
             if (std::ranges::find(k.rows, node_key.str(), &TableKey::name) != k.rows.end())
                 owners += fmt::format("{}\"{}\"", owners.empty() ? "" : " or ", k.name);
-        if (!owners.empty())
-            refuse(node_key.str(),
-                   fmt::format("belongs to {} = {}, and this is \"{}\"", key.name, owners, own.name));
+        if (why.empty()) why = fmt::format("belongs to {} = {}, and this is \"{}\"", key.name, owners, own.name);
+        refuse(node_key.str(), why);
     }
     for (const TableKey& k : own.rows)
         if (!k.required.empty()) require(k.name, k.required);

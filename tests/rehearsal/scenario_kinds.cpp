@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "rehearsal/judge/judge.h"
@@ -50,6 +51,17 @@ TEST(GateKinds, AreThoseOfTheDocument) {
     for (const GateKind& kind : Judge::gate_kinds())
         if (!kind.key.empty()) kinds[std::string(kind.key)] = kind.text;
     EXPECT_EQ(kinds, documented);
+}
+
+TEST(GateKinds, AreTheKeysOfGates) {
+    const TableKeys& gates = *kScenarioFileKeys.find("gates")->value.keys;
+    std::set<std::string_view> keys, kinds;
+    for (const TableKey* key : gates.all_rows()) keys.insert(key->name);
+    for (const GateKind& kind : Judge::gate_kinds())
+        if (!kind.key.empty()) kinds.insert(kind.key);
+    EXPECT_EQ(keys, kinds);
+    for (const LandingLimit& limit : landing_limits())
+        EXPECT_TRUE(gates.find("landing")->value.keys->find(limit.key)) << limit.key;
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ def schema(kind):
     return json.loads(said.stdout)
 
 
-SCHEMAS = {kind: schema(kind) for kind in ("scene", "lidar")}
+SCHEMAS = {kind: schema(kind) for kind in ("scene", "lidar", "scenario")}
 
 
 def errors(kind, document):
@@ -131,6 +131,19 @@ def documented_rows(file):
     return rows
 
 
+def rehearsal_rows(file):
+    """(table, keys, default, meaning) of each row of the key tables that name the table in their first column."""
+    tables, rows, inside = [], [], False
+    for line in file.read_text().splitlines():
+        cells = [c.strip() for c in line.strip("|").split("|")]
+        inside = line.startswith("| table | key |") or (inside and line.startswith("|"))
+        if inside and "`" in cells[1]:
+            tables = re.findall(r"`\[+(\w+)\]+`", cells[0]) or tables
+            names = cells[1] if "..." not in cells[1] else cells[3]
+            rows += [(table, re.findall(r"`(\w+)(?: = [^`]*)?`", names), cells[2], cells[3]) for table in tables]
+    return rows
+
+
 class Output(unittest.TestCase):
     def test_json_is_one_document(self):
         said = subprocess.run([NARPA, "check", "--schema", "scene", "--json"], capture_output=True, text=True, check=True)
@@ -170,6 +183,48 @@ class Documents(unittest.TestCase):
 
     def test_lidar(self):
         self.compare("lidar", "lidar-description.md")
+
+
+class RehearsalDocument(unittest.TestCase):
+    """docs/rehearsal.md describes scenarios by tables without ranges: keys, required ones, kinds, choices, defaults."""
+
+    def test_scenario(self):
+        documented = {}
+        for name, keys, default, meaning in rehearsal_rows(SOURCE / "docs" / "rehearsal.md"):
+            table = SCHEMAS["scenario"]["properties"].get(name)
+            self.assertIsNotNone(table, f"[{name}] has no rows")
+            table = table.get("items", table)
+            documented.setdefault(name, set()).update(keys)
+            defaults = re.split(r", (?![^\[]*\])", default)
+            for i, key in enumerate(keys):
+                with self.subTest(table=name, key=key):
+                    value = table["properties"].get(key)
+                    self.assertIsNotNone(value, "the document has a key without a row")
+                    own = defaults[i] if len(defaults) == len(keys) else default
+                    required = key in table.get("required", [])
+                    if default not in ("required by these kinds", ""):
+                        self.assertEqual(own == "required", required)
+                    if re.fullmatch(NUMBER, own) and value is not True and value.get("type") in ("number", "integer"):
+                        self.assertEqual(list(jsonschema.Draft202012Validator(value).iter_errors(float(own))), [])
+                    if value is not True and value.get("type") == "object":
+                        inner, words = set(value["properties"]), set(re.findall(r"\w+", meaning))
+                        self.assertLessEqual(inner, words)
+                        self.assertLessEqual({word for word in words if "_" in word}, inner)
+        for name, keys in documented.items():
+            table = SCHEMAS["scenario"]["properties"][name]
+            rows = set(table.get("items", table)["properties"])
+            self.assertFalse(rows - keys, f"[{name}]: rows that rehearsal.md lacks")
+        self.assertEqual(set(SCHEMAS["scenario"]["properties"]), set(documented))
+
+    def test_words(self):
+        text = (SOURCE / "docs" / "rehearsal.md").read_text()
+        tables = SCHEMAS["scenario"]["properties"]
+        kinds = tables["fault"]["items"]["properties"]["kind"]["enum"]
+        self.assertEqual(sorted(kinds), sorted(re.findall(r'`kind = "(\w+)"`', text)))
+        for word in tables["orbit"]["properties"]["model"]["enum"]:
+            self.assertIn(f'"{word}"', text)
+        for word in tables["navigation"]["properties"]["camera_method"]["enum"]:
+            self.assertIn(f"`{word}`", text)
 
 
 class Shipped(unittest.TestCase):
@@ -264,27 +319,132 @@ BROKEN = [
 ]
 
 
+GOOD_SCENARIO = """
+[scenario]
+name = "s"
+scene = "scene.toml"
+duration_s = 400.0
+pose_rate_hz = 20.0
+seed = 1
+[orbit]
+model = "two-body"
+radius_m = 6778137.0
+up = [0.0, 0.0, 1.0]
+along = [1.0, 0.0, 0.0]
+[target]
+body = "station"
+mass_kg = 120000.0
+inertia_kg_m2 = [6.0e6, 9.0e6, 9.0e6]
+port = {position_m = [1.0, 0.0, 0.0], attitude_wxyz = [1.0, 0.0, 0.0, 0.0]}
+with_lvlh = true
+[chaser]
+body = "chaser"
+[start]
+position_m = [25.0, 1.0, -0.8]
+position_sigma_m = [0.5, 0.4, 0.4]
+[thrusters]
+force_n = 400.0
+gain_sigma = 0.02
+[attitude_sensor]
+rate_sigma_deg_s = 0.002
+[[leg]]
+to_m = [0.0, 0.0, 0.0]
+speed_m_s = 0.075
+hold_s = 10
+contact = true
+[navigation]
+cameras = ["nav"]
+camera_method = "features"
+period_s = 1.0
+abort_sigma_m = 3.0
+[model_error]
+scale = 0.01
+told = 1.0
+[control]
+damping = 0.9
+[[fault]]
+kind = "thruster_off"
+from_s = 10
+axis = "+fy"
+[gates]
+keep_out_m = 8.0
+distance_m = [0.0, 100.0]
+corridor = {half_angle_deg = 8.0, radius_m = 0.3}
+navigation = {sigmas = 4.0, share = 0.99}
+contact = {}
+complete = true
+"""
+ITS_SCENE = """
+[sun]
+direction = [1, 0, 0]
+[[body]]
+name = "station"
+sphere = {radius_m = 2}
+can_id = 0x110
+[[body]]
+name = "chaser"
+position_m = [30, 0, 0]
+sphere = {radius_m = 1}
+can_id = 0x100
+[[camera]]
+name = "nav"
+mount = "chaser"
+resolution = [64, 48]
+fov_diagonal_deg = 30
+rate_hz = 1
+"""
+BROKEN_SCENARIOS = [
+    ('name = "s"', "name = 7"), ('name = "s"', ""), ('scene = "scene.toml"', ""), ('scene = "scene.toml"', "scene = 1"),
+    ("duration_s = 400.0", "duration_s = 0"), ("duration_s = 400.0", "duration = 400.0"),
+    ("duration_s = 400.0", "duration_s = 2e6"), ("pose_rate_hz = 20.0", "pose_rate_hz = 1001.0"), ("seed = 1", "seed = -1"),
+    ("seed = 1", "seed = 1.5"), ('model = "two-body"', 'model = "three-body"'), ('model = "two-body"', 'model = "surface"'),
+    ("radius_m = 6778137.0", "radius_m = -1"), ("radius_m = 6778137.0", "rotation_rad_s = 1e-5"),
+    ("along = [1.0, 0.0, 0.0]", "along = 1.0"), ('body = "station"', ""), ('body = "chaser"', 'bodies = "chaser"'),
+    ("mass_kg = 120000.0", "mass_kg = 0"), ("inertia_kg_m2 = [6.0e6, 9.0e6, 9.0e6]", "inertia_kg_m2 = [6.0e6, 9.0e6]"),
+    ("with_lvlh = true", "with_lvlh = 1"), ("position_sigma_m = [0.5, 0.4, 0.4]", "position_sigma_m = [0.5, -0.4, 0.4]"),
+    ("force_n = 400.0", 'force_n = "much"'), ("gain_sigma = 0.02", "gain_sigma = 0.6"),
+    ("rate_sigma_deg_s = 0.002", "rate_sigma_deg_s = -0.002"), ("speed_m_s = 0.075", "speed_m_s = 0"),
+    ("speed_m_s = 0.075", "velocity_m_s = 0.075"), ("hold_s = 10", "hold_s = 1e7"), ("contact = true", 'contact = "yes"'),
+    ('cameras = ["nav"]', 'cameras = "nav"'), ('camera_method = "features"', 'camera_method = "sparse"'),
+    ("period_s = 1.0", "period_s = 0.001"), ("abort_sigma_m = 3.0", "abort_sigma_m = 0"), ("scale = 0.01", "scale = -0.01"),
+    ("told = 1.0", "tell = 1.0"), ("damping = 0.9", "damping = 11"), ('kind = "thruster_off"', 'kind = "gremlin"'),
+    ('kind = "thruster_off"', 'kind = "commands_lost"'), ('kind = "thruster_off"', 'kind = "attitude_bias"'),
+    ('kind = "thruster_off"', ""), ("from_s = 10", "from_s = -1"), ('axis = "+fy"', 'axis = "up"'), ('axis = "+fy"', ""),
+    ("keep_out_m = 8.0", "keep_out_m = 0"), ("distance_m = [0.0, 100.0]", "distance_m = 100.0"),
+    ("corridor = {half_angle_deg = 8.0, radius_m = 0.3}", "corridor = {half_angle_deg = 91.0}"),
+    ("corridor = {half_angle_deg = 8.0, radius_m = 0.3}", "corridor = {half_angle = 8.0}"),
+    ("navigation = {sigmas = 4.0, share = 0.99}", "navigation = {share = 1.5}"), ("contact = {}", "contact = 1"),
+    ("complete = true", "complete = 1"), ("[target]", "[targets]"), ("[control]", "[controls]"), ("[start]", "[[start]]"),
+]
+
+
 class Broken(unittest.TestCase):
     def accepted_by_narpa(self, text):
         with tempfile.TemporaryDirectory() as folder:
-            path = pathlib.Path(folder) / "scene.toml"
+            path = pathlib.Path(folder) / "file.toml"
             path.write_text(text)
+            (pathlib.Path(folder) / "scene.toml").write_text(ITS_SCENE)
             said = subprocess.run([NARPA, "check", str(path)], capture_output=True, text=True)
             self.assertIn(said.returncode, (0, 2), said.stderr)
             return said.returncode == 0, said.stderr
 
-    def test_the_unbroken_scene_is_accepted_by_both(self):
-        self.assertEqual(errors("scene", tomllib.loads(GOOD)), [])
-        self.assertEqual(self.accepted_by_narpa(GOOD)[0], True, self.accepted_by_narpa(GOOD)[1])
+    def compare(self, kind, good, broken):
+        self.assertEqual(errors(kind, tomllib.loads(good)), [])
+        accepted, why = self.accepted_by_narpa(good)
+        self.assertTrue(accepted, why)
+        self.assertGreaterEqual(len(broken), 50)
+        for line, wrong in broken:
+            with self.subTest(line=line, wrong=wrong):
+                self.assertEqual(good.count(f"\n{line}\n"), 1)
+                text = good.replace(f"\n{line}\n", f"\n{wrong}\n")
+                self.assertNotEqual(errors(kind, tomllib.loads(text)), [])
+                self.assertFalse(self.accepted_by_narpa(text)[0])
 
     def test_each_broken_scene_is_refused_by_both(self):
-        self.assertGreaterEqual(len(BROKEN), 50)
-        for line, wrong in BROKEN:
-            with self.subTest(line=line, wrong=wrong):
-                self.assertEqual(GOOD.count(f"\n{line}\n"), 1)
-                text = GOOD.replace(f"\n{line}\n", f"\n{wrong}\n")
-                self.assertNotEqual(errors("scene", tomllib.loads(text)), [])
-                self.assertEqual(self.accepted_by_narpa(text)[0], False)
+        self.compare("scene", GOOD, BROKEN)
+
+    def test_each_broken_scenario_is_refused_by_both(self):
+        self.compare("scenario", GOOD_SCENARIO, BROKEN_SCENARIOS)
 
 
 unittest.main(argv=sys.argv[:1])

@@ -34,7 +34,6 @@
 #include "renderer/camera/scene_camera.h"
 #include "renderer/keys/json_schema.h"
 #include "renderer/material/bsdf_kind.h"
-#include "renderer/scene_file/kind_names.h"
 #include "renderer/scene_file/lidar_description.h"
 #include "renderer/scene_file/scene_file.h"
 
@@ -122,6 +121,10 @@ nlohmann::json describe_shape(const Scene& scene, const Body& body) {
     return {{"triangles", scene.meshes[static_cast<std::size_t>(std::get<int>(body.shape))].faces.size()}};
 }
 
+std::string_view kind_name(const Light& light) {
+    return Light::kKindNames[static_cast<std::size_t>(light.kind)];
+}
+
 nlohmann::json describe(const World& world) {
     const Scene& s = world.scene();
     nlohmann::json bodies = nlohmann::json::array(), cameras = nlohmann::json::array(),
@@ -142,9 +145,9 @@ nlohmann::json describe(const World& world) {
                            {"lens", c.lens.has_value()}});
     for (const Lidar& l : s.lidars)
         lidars.push_back({{"name", l.name}, {"model", l.model->spec().name}, {"rate_hz", l.model->spec().rate_hz}});
-    for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", name_of(l.kind, kLightKinds)}});
+    for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", kind_name(l)}});
     const std::size_t stars = s.stars ? s.stars->stars.size() : 0;
-    nlohmann::json render{{"method", name_of(s.render.method, kMethods)}};
+    nlohmann::json render{{"method", RenderSettings::kMethodNames[static_cast<std::size_t>(s.render.method)]}};
     if (s.render.budget_rays > 0)
         render["budget_rays"] = s.render.budget_rays;
     else if (s.render.budget_ns > 0)
@@ -173,7 +176,7 @@ std::string light_words(const Light& l) {
         case Light::Kind::point:
         case Light::Kind::directional: break;
     }
-    return std::string(name_of(l.kind, kLightKinds));
+    return std::string(kind_name(l));
 }
 
 std::string budget_words(const RenderSettings& r) {

@@ -207,9 +207,11 @@ int PixelFill::octave_of(float contrast) const noexcept {
 int PixelFill::level_of(std::uint32_t tile, std::size_t place) const noexcept {
     const float contrast = guess_[tile][place].contrast;
     if (contrast < 0) return 0;
+    const std::uint64_t hash = hash_of(tile, place);
+    if (hash % kComparedPart == 0) return 1;
     constexpr int kLast = kLevels - kPerOctave;  // of the lowest octave, in no order
     const int level = contrast > 0 ? static_cast<int>(kPerOctave * std::log2(most_ / contrast)) : kLast;
-    if (level >= kLast) return 1 + kLast + static_cast<int>(hash_of(tile, place) % kPerOctave);
+    if (level >= kLast) return 1 + kLast + static_cast<int>(hash / kComparedPart % kPerOctave);
     return 1 + std::max(level, 0);
 }
 

@@ -8,9 +8,9 @@
 /// silhouettes do not move on average.
 ///
 /// The error of reconstruction is measured: each traced pixel is compared with what its neighbours in the coarser
-/// lattice say of it. An edge has no scale, so pixels of equal contrast have similar errors in both lattices: the
-/// mean square of the differences, octave by octave of contrast, predicts the error of the pixels that were not
-/// traced.
+/// lattice say of it; a few come first whatever their contrast. An edge has no scale, so pixels of equal contrast
+/// have similar errors in both lattices: the mean square of the differences, octave by octave of contrast, predicts
+/// the error of the pixels that were not traced.
 #pragma once
 
 #include <array>

@@ -99,7 +99,9 @@ inline constexpr float kOneSurfaceGap = 0.05f, kOneSideGap = 0.005f;
 inline constexpr float kSilhouetteContrast = 1.0f / 64;
 /// Fewer comparisons than this say nothing about an octave of contrast; then the squared error is this part of the
 /// squared contrast.
-inline constexpr double kMinComparisons = 30, kFillErrorOfContrast = 0.2;
+inline constexpr double kMinComparisons = 30, kFillErrorOfContrast = 0.5;
+/// One in so many pixels is traced first, to be compared.
+inline constexpr std::uint64_t kComparedPart = 64;
 /// Where samples are noisy, so are the neighbours with which they are compared: the squared error of a traced and
 /// of a reconstructed pixel, as parts of the mean squared difference. cornell.
 inline constexpr double kNoiseOfTraced = 0.6, kNoiseOfFilled = 0.4;

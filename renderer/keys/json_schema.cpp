@@ -54,10 +54,8 @@ Json value_schema(const KeyValue& value, const TableKeys& keys) {
             for (const TableKind& k : keys.kinds()) names.push_back(k.name);
             return {{"enum", names}};
         }
-        case table: return value.keys ? table_schema(*value.keys) : Json{{"type", "object"}};
-        case tables:
-            return {{"type", "array"},
-                    {"items", value.keys ? table_schema(*value.keys) : Json{{"type", "object"}}}};
+        case table: return table_schema(*value.keys);
+        case tables: return {{"type", "array"}, {"items", table_schema(*value.keys)}};
     }
     return Json::object();
 }

@@ -175,12 +175,6 @@ constexpr KeyValue date() {
 constexpr KeyValue table(const TableKeys& keys) {
     return {.type = Type::table, .keys = &keys};
 }
-constexpr KeyValue table() {
-    return {.type = Type::table};
-}  // of a reader without rows
-constexpr KeyValue tables() {
-    return {.type = Type::tables};
-}  // likewise
 constexpr KeyValue tables(const TableKeys& keys) {
     return {.type = Type::tables, .keys = &keys};
 }

@@ -106,7 +106,8 @@ const toml::node* TableReader::find(std::string_view key) {
 
 const KeyValue& TableReader::row(std::string_view key, [[maybe_unused]] KeyValue::Type type) const {
     static constexpr KeyValue kNone{};
-    const TableKey* const found = keys_ ? keys_->find(key, kind_) : nullptr;
+    const TableKey* found = keys_ ? keys_->find(key, kind_) : nullptr;
+    if (keys_ && !found) found = keys_->find(key);  // refused, as it belongs to other kinds
     if (!found) {
         assert(!keys_ && "a key that is read has a row");
         return kNone;
@@ -257,19 +258,12 @@ std::optional<std::vector<double>> TableReader::numbers(std::string_view key) {
     return numbers(key, row(key, KeyValue::Type::numbers));
 }
 
-std::optional<std::vector<double>> TableReader::numbers(std::string_view key, std::initializer_list<int> counts,
-                                                        const Range& range) {
-    KeyValue expected{.type = KeyValue::Type::numbers, .range = range};
-    std::ranges::copy(counts, expected.counts.begin());
-    return numbers(key, expected);
-}
-
 std::optional<Vec3> TableReader::vec3(std::string_view key) {
     return vec3(key, row(key, KeyValue::Type::numbers).range);
 }
 
 std::optional<Vec3> TableReader::vec3(std::string_view key, const Range& range) {
-    const auto v = numbers(key, {3}, range);
+    const auto v = numbers(key, rows::vec3(range));
     if (!v) return std::nullopt;
     return Vec3{(*v)[0], (*v)[1], (*v)[2]};
 }
@@ -293,16 +287,13 @@ std::optional<std::array<double, 2>> TableReader::pair(std::string_view key) {
 }
 
 std::optional<std::array<double, 2>> TableReader::pair(std::string_view key, const Range& range) {
-    const auto v = numbers(key, {2}, range);
+    const auto v = numbers(key, rows::pair(range));
     if (!v) return std::nullopt;
     return std::array{(*v)[0], (*v)[1]};
 }
 
 std::optional<Rgb> TableReader::rgb(std::string_view key) {
-    return rgb(key, row(key, KeyValue::Type::rgb).range);
-}
-
-std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
+    const Range& range = row(key, KeyValue::Type::rgb).range;
     const toml::node* node = find(key);
     if (node && node->is_array()) {
         const auto v = vec3(key, range);
@@ -317,7 +308,7 @@ std::optional<Rgb> TableReader::rgb(std::string_view key, const Range& range) {
 
 std::optional<Quat> TableReader::attitude(std::string_view key) {
     (void)row(key, KeyValue::Type::attitude);
-    const auto v = numbers(key, {4});
+    const auto v = numbers(key, rows::numbers({4}));
     if (!v) return std::nullopt;
     const Quat q{(*v)[0], (*v)[1], (*v)[2], (*v)[3]};
     if (const double n = norm(q); !(std::abs(n - 1.0) < 1e-3)) {
@@ -329,10 +320,7 @@ std::optional<Quat> TableReader::attitude(std::string_view key) {
 }
 
 std::optional<std::array<int, 2>> TableReader::size(std::string_view key) {
-    return size(key, static_cast<int>(row(key, KeyValue::Type::size).high));
-}
-
-std::optional<std::array<int, 2>> TableReader::size(std::string_view key, int high) {
+    const std::int64_t high = row(key, KeyValue::Type::size).high;
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     const toml::array* array = node->as_array();
@@ -347,10 +335,7 @@ std::optional<std::array<int, 2>> TableReader::size(std::string_view key, int hi
 }
 
 std::optional<std::vector<Vec3>> TableReader::points(std::string_view key) {
-    return points(key, row(key, KeyValue::Type::points).count_max);
-}
-
-std::optional<std::vector<Vec3>> TableReader::points(std::string_view key, int count_max) {
+    const int count_max = row(key, KeyValue::Type::points).count_max;
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
     std::vector<Vec3> all;
@@ -406,13 +391,12 @@ bool TableReader::is_table(std::string_view key) {
     return node && node->is_table();
 }
 
-std::optional<TableReader> TableReader::table(std::string_view key, const TableKeys* keys) {
+std::optional<TableReader> TableReader::table(std::string_view key) {
     const toml::node* node = find(key);
     if (!node) return std::nullopt;
-    if (const toml::table* t = node->as_table()) {
-        if (keys_) keys = row(key, KeyValue::Type::table).keys;
-        return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_, keys);
-    }
+    if (const toml::table* t = node->as_table())
+        return TableReader(*t, t->is_inline() ? std::string(key) : fmt::format("[{}]", key), *problems_,
+                           row(key, KeyValue::Type::table).keys);
     fail(key, fmt::format("got {}, expected a table", shown(*node)));
     return std::nullopt;
 }
@@ -438,32 +422,12 @@ void TableReader::refuse(std::string_view key, const std::string& why) {
     fail(key, why);
 }
 
-void TableReader::refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds) {
-    const auto has_key = [](const KindKeys& k, std::string_view key) {
-        return std::find(k.keys.begin(), k.keys.end(), key) != k.keys.end();
-    };
-    for (const auto& [node_key, value] : *table_) {
-        const std::string_view key = node_key.str();
-        std::string owners;
-        bool is_own = false;
-        for (const KindKeys& k : kinds)
-            if (has_key(k, key)) {
-                owners += fmt::format("{}\"{}\"", owners.empty() ? "" : " or ", k.kind);
-                is_own |= k.kind == kind;
-            }
-        if (!owners.empty() && !is_own)
-            refuse(key, fmt::format("belongs to kind = {}, and this is \"{}\"", owners, kind));
-    }
-}
-
 void TableReader::finish() {
     std::vector<std::string> known = asked_;
     if (keys_) {
         for (const TableKey* key : keys_->all_rows()) known.emplace_back(key->name);
-        const std::vector<TableKind> kinds = keys_->kinds ? keys_->kinds() : std::vector<TableKind>{};
-        for (std::size_t k = 0; k < kinds.size(); ++k)
-            if (kind_ < 0 || kind_ == static_cast<int>(k))
-                for (const TableKey& key : kinds[k].rows) known.emplace_back(key.name);
+        for (const TableKind& kind : keys_->kinds ? keys_->kinds() : std::vector<TableKind>{})
+            for (const TableKey& key : kind.rows) known.emplace_back(key.name);
     }
     for (const auto& [key, value] : *table_)
         if (std::ranges::find(known, key.str()) == known.end())

@@ -12,6 +12,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -63,12 +64,6 @@ private:
 /// or vanishes, and no rounding changes. Zero stays zero.
 Vec3 scaled_to_one(const Vec3& a);
 
-/// The keys that a table has when its `kind` is this word, beside those that every kind has.
-struct KindKeys {
-    std::string_view kind;
-    std::vector<std::string_view> keys;
-};
-
 /// One table of the file. Ranges, choices and counts are those of the keys' rows, unless a call narrows them.
 class TableReader {
 public:
@@ -94,8 +89,6 @@ public:
     std::optional<std::vector<std::string>> texts(std::string_view key);
     /// An array of one of these counts.
     std::optional<std::vector<double>> numbers(std::string_view key);
-    std::optional<std::vector<double>> numbers(std::string_view key, std::initializer_list<int> counts,
-                                               const Range& range = kAnyNumber);
     std::optional<Vec3> vec3(std::string_view key);
     std::optional<Vec3> vec3(std::string_view key, const Range& range);
     /// A unit vector from one of any length but 0.
@@ -104,15 +97,12 @@ public:
     std::optional<std::array<double, 2>> pair(std::string_view key, const Range& range);
     /// One number for the three bands, or [r, g, b].
     std::optional<Rgb> rgb(std::string_view key);
-    std::optional<Rgb> rgb(std::string_view key, const Range& range);
     /// [w, x, y, z]; made exactly unit when | |q| - 1 | < 1e-3, else a problem.
     std::optional<Quat> attitude(std::string_view key);
     /// [width, height], each in [1, high].
     std::optional<std::array<int, 2>> size(std::string_view key);
-    std::optional<std::array<int, 2>> size(std::string_view key, int high);
     /// [[x, y, z], ...]
     std::optional<std::vector<Vec3>> points(std::string_view key);
-    std::optional<std::vector<Vec3>> points(std::string_view key, int count_max);
     /// UTC in ns since 1970, of the years 1900 to 2099; a time without an offset is UTC.
     std::optional<std::int64_t> date(std::string_view key);
     /// Sets `value` if the key is there and good.
@@ -130,6 +120,8 @@ public:
             value = rgb(key).value_or(value);
         } else if constexpr (std::same_as<T, Quat>) {
             value = attitude(key).value_or(value);
+        } else if constexpr (std::is_enum_v<T>) {  // enumerators in the order of the row's words
+            if (const auto index = word(key)) value = static_cast<T>(*index);
         } else {
             static_assert(std::same_as<T, std::string>);
             value = text(key).value_or(std::move(value));
@@ -149,8 +141,7 @@ public:
     }
     /// The index of a choice among the words of its row.
     std::optional<std::size_t> word(std::string_view key);
-    /// `keys`: those of the table where the row of `key` names none.
-    std::optional<TableReader> table(std::string_view key, const TableKeys* keys = nullptr);
+    std::optional<TableReader> table(std::string_view key);
     /// The tables of `[[key]]`, in the file's order.
     std::vector<TableReader> tables(std::string_view key);
 
@@ -159,8 +150,6 @@ public:
     [[nodiscard]] bool is_table(std::string_view key);
     /// A known key that is not allowed here; `why` completes "KEY: ...". No effect where it is absent.
     void refuse(std::string_view key, const std::string& why);
-    /// Refuses the keys that belong to other kinds only: each kind of table has its own.
-    void refuse_keys_of_other_kinds(std::string_view kind, std::span<const KindKeys> kinds);
     /// Notes a problem at the value of a key (at the table when absent).
     void fail(std::string_view key, const std::string& what);
     [[nodiscard]] FilePlace place(std::string_view key) const;

@@ -50,7 +50,7 @@ Vec3 akimov_direction(const Surface&, const Vec3& n, const Vec3&, const Random3&
 // degrees.
 constinit const BsdfKind kinds::akimov{
     .name = "akimov",
-    .keys = kAlbedoKeys,
+    .keys = kAlbedoRows,
     .read = read_albedo,
     .f = akimov_f,
     .pdf = akimov_pdf,

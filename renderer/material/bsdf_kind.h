@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "renderer/keys/keys.h"
 #include "renderer/material/bsdf.h"
 
 namespace narpa {
@@ -23,7 +24,7 @@ using Random3 = std::array<double, 3>;
 /// Members that a kind does not have are null, false or empty. Functions neither allocate nor throw.
 struct BsdfKind {
     std::string_view name;                                    ///< `kind` of a scene's material
-    std::span<const std::string_view> keys{};                 ///< keys of the material beside those of all kinds
+    std::span<const TableKey> keys{};                         ///< keys of the material beside those of all kinds
     void (*read)(TableReader& table, Material& m) = nullptr;  ///< reads `keys`, except those of textures
 
     /// f is kd / pi, plus Phong's lobe (phong_lobe.h) where Surface::specular is not 0. Vector code evaluates these

@@ -18,13 +18,20 @@
 namespace narpa {
 namespace {
 
-constexpr std::string_view kGgxKeys[] = {"albedo", "texture", "metallic", "roughness", "ior", "fresnel"};
+constexpr TableKey kGgxRows[]{
+    kAlbedoRow,
+    kTextureRow,
+    {"metallic", rows::number(kUnit)},
+    {"roughness", rows::number(kUnit)},
+    {"ior", rows::number({.low = 1, .high = 3})},
+    kFresnelRow,
+};
 
 void ggx_read(TableReader& table, Material& m) {
     read_albedo(table, m);
-    m.metallic = static_cast<float>(table.number("metallic", kUnit).value_or(m.metallic));
-    m.roughness = static_cast<float>(table.number("roughness", kUnit).value_or(m.roughness));
-    read_fresnel(table, m, 1, 3);
+    table.read("metallic", m.metallic);
+    table.read("roughness", m.roughness);
+    read_fresnel(table, m);
 }
 
 /// Smoother surfaces are treated as this one: a lobe of 20 arcsec, the limit that double and a mesh's float normals
@@ -195,7 +202,7 @@ Rgb ggx_largest_albedo(const Material& m) noexcept {
 }  // namespace
 
 constinit const BsdfKind kinds::ggx{.name = "ggx",
-                                    .keys = kGgxKeys,
+                                    .keys = kGgxRows,
                                     .read = ggx_read,
                                     .f = ggx_f,
                                     .pdf = ggx_pdf,

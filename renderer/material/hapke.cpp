@@ -14,19 +14,23 @@
 namespace narpa {
 namespace {
 
-constexpr std::string_view kHapkeKeys[] = {"albedo",       "texture",      "b", "c", "opposition_b0",
-                                           "opposition_h", "roughness_deg"};
+constexpr TableKey kHapkeRows[]{
+    kAlbedoRow,
+    kTextureRow,
+    {"b", rows::number({.low = 0, .high = 0.95})},
+    {"c", rows::number({.low = -1, .high = 1})},
+    {"opposition_b0", rows::number({.low = 0, .high = 10})},
+    {"opposition_h", rows::number({.low = 0, .high = 10, .low_open = true})},
+    {"roughness_deg", rows::number({.low = 0, .high = 60})},
+};
 
 void hapke_read(TableReader& table, Material& m) {
-    const auto number = [&table](const char* key, const Range& range, float& value) {
-        value = static_cast<float>(table.number(key, range).value_or(value));
-    };
     read_albedo(table, m);
-    number("b", {.low = 0, .high = 0.95}, m.hapke.phase_b);
-    number("c", {.low = -1, .high = 1}, m.hapke.phase_c);
-    number("opposition_b0", {.low = 0, .high = 10}, m.hapke.opposition_b0);
-    number("opposition_h", {.low = 0, .high = 10, .low_open = true}, m.hapke.opposition_h);
-    if (const auto degrees = table.number("roughness_deg", {.low = 0, .high = 60}))
+    table.read("b", m.hapke.phase_b);
+    table.read("c", m.hapke.phase_c);
+    table.read("opposition_b0", m.hapke.opposition_b0);
+    table.read("opposition_h", m.hapke.opposition_h);
+    if (const auto degrees = table.number("roughness_deg"))
         m.hapke.roughness_rad = static_cast<float>(*degrees * kPi / 180);
 }
 
@@ -146,7 +150,7 @@ Rgb hapke_ambient(const Surface& s) noexcept {
 }  // namespace
 
 constinit const BsdfKind kinds::hapke{.name = "hapke",
-                                      .keys = kHapkeKeys,
+                                      .keys = kHapkeRows,
                                       .read = hapke_read,
                                       .f = hapke_f,
                                       .pdf = hapke_pdf,

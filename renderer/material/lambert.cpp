@@ -7,7 +7,7 @@
 namespace narpa {
 namespace {
 
-constexpr std::string_view kLambertKeys[] = {"albedo", "texture", "cloud_texture", "cloud_albedo"};
+constexpr TableKey kLambertRows[]{kAlbedoRow, kTextureRow, kCloudTextureRow, kCloudAlbedoRow};
 
 Rgb lambert_f(const Surface& s, const BsdfGeometry&) noexcept {
     return s.diffuse * static_cast<float>(std::numbers::inv_pi);
@@ -16,7 +16,7 @@ Rgb lambert_f(const Surface& s, const BsdfGeometry&) noexcept {
 }  // namespace
 
 constinit const BsdfKind kinds::lambert{.name = "lambert",
-                                        .keys = kLambertKeys,
+                                        .keys = kLambertRows,
                                         .read = read_albedo,
                                         .lambert_or_phong = true,
                                         .f = lambert_f,

@@ -1,20 +1,29 @@
 #include "renderer/material/material_keys.h"
 
-#include <array>
-
 #include "renderer/keys/toml_reader.h"
 
 namespace narpa {
+namespace {
+
+constexpr std::array<std::string_view, 2> kWrapNames{"repeat", "clamp"}, kColourNames{"srgb", "linear"};
+constexpr TableKey kTextureRows[]{
+    {"file", rows::file(), "the name of an image file"},
+    {"wrap", rows::choice<kWrapNames>()},
+    {"colour", rows::choice<kColourNames>()},
+};
+
+}  // namespace
+
+constinit const TableKeys kColourTextureKeys{.rows = kTextureRows},
+    kDataTextureKeys{.rows = std::span(kTextureRows).first(2)};
 
 void read_albedo(TableReader& table, Material& m) {
-    m.diffuse = table.rgb("albedo", kUnit).value_or(m.diffuse);
+    table.read("albedo", m.diffuse);
 }
 
-void read_fresnel(TableReader& table, Material& m, double ior_min, double ior_max) {
-    static constexpr std::array<std::pair<std::string_view, bool>, 2> kFresnel{
-        {{"exact", false}, {"schlick", true}}};
-    m.ior = static_cast<float>(table.number("ior", {.low = ior_min, .high = ior_max}).value_or(m.ior));
-    m.schlick = table.choice<bool>("fresnel", kFresnel).value_or(m.schlick);
+void read_fresnel(TableReader& table, Material& m) {
+    table.read("ior", m.ior);
+    m.schlick = table.word("fresnel") == 1u;
 }
 
 }  // namespace narpa

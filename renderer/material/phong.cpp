@@ -1,7 +1,6 @@
 // Phong's lobe: sampling for the BRDF (Lafortune and Willems 1994), and the paper's form, which is not a BRDF.
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "base/constants.h"
 #include "renderer/keys/toml_reader.h"
@@ -14,23 +13,34 @@ namespace narpa {
 namespace {
 
 constexpr float kPhongInvPi = static_cast<float>(1 / kPi);
-constexpr std::string_view kPhongKeys[] = {"albedo",           "texture",       "specular",    "exponent",
-                                           "specular_texture", "cloud_texture", "cloud_albedo"};
-constexpr std::string_view kClassicKeys[] = {"albedo",   "texture", "specular",
-                                             "exponent", "ambient", "specular_texture"};
+constexpr Range kExponent{.low = 0, .high = 1e4};
+constexpr TableKey kPhongRows[]{
+    kAlbedoRow,
+    kTextureRow,
+    {"specular", rows::rgb(kUnit), "a number or [r, g, b] in [0, 1], as the kind is \"phong\""},
+    {"exponent", rows::number(kExponent), "a number in [0, 10000], as the kind is \"phong\""},
+    kSpecularTextureRow,
+    kCloudTextureRow,
+    kCloudAlbedoRow,
+};
+constexpr TableKey kClassicRows[]{
+    kAlbedoRow,
+    kTextureRow,
+    {"specular", rows::rgb(kUnit), "a number or [r, g, b] in [0, 1], as the kind is \"phong_classic\""},
+    {"exponent", rows::number(kExponent), "a number in [0, 10000], as the kind is \"phong_classic\""},
+    kSpecularTextureRow,
+    {"ambient", rows::rgb(kUnit)},
+};
 
 void phong_read(TableReader& table, Material& m) {
-    const std::string kind(m.kind->name);
     read_albedo(table, m);
-    table.require("specular", "a number or [r, g, b] in [0, 1], as the kind is \"" + kind + "\"");
-    table.require("exponent", "a number in [0, 10000], as the kind is \"" + kind + "\"");
-    m.specular = table.rgb("specular", kUnit).value_or(Rgb{});
-    m.exponent = static_cast<float>(table.number("exponent", {.low = 0, .high = 1e4}).value_or(m.exponent));
+    table.read("specular", m.specular);
+    table.read("exponent", m.exponent);
 }
 
 void read_phong_classic(TableReader& table, Material& m) {
     phong_read(table, m);
-    m.ambient = table.rgb("ambient", kUnit).value_or(m.ambient);
+    table.read("ambient", m.ambient);
 }
 
 /// Share of the samples for the lobe: by the albedos, each at its largest. A wide lobe leaves more to the cosine,
@@ -82,7 +92,7 @@ Rgb unbounded(const Material&) noexcept {
 
 constinit const BsdfKind kinds::phong{
     .name = "phong",
-    .keys = kPhongKeys,
+    .keys = kPhongRows,
     .read = phong_read,
     .lambert_or_phong = true,
     .has_lobe = true,
@@ -94,7 +104,7 @@ constinit const BsdfKind kinds::phong{
 
 constinit const BsdfKind kinds::phong_classic{
     .name = "phong_classic",
-    .keys = kClassicKeys,
+    .keys = kClassicRows,
     .read = read_phong_classic,
     .has_lobe = true,
     .direct_only = true,

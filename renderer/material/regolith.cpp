@@ -43,11 +43,12 @@ double lunar_lambert_weight(double phase_rad) noexcept {
 
 namespace {
 
-constexpr std::string_view kSeeligerKeys[] = {"albedo", "texture", "asymmetry"};
+constexpr TableKey kSeeligerRows[]{
+    kAlbedoRow, kTextureRow, {"asymmetry", rows::number({.low = -0.95, .high = 0.95})}};
 
 void read_lommel_seeliger(TableReader& table, Material& m) {
     read_albedo(table, m);
-    m.asymmetry = static_cast<float>(table.number("asymmetry", {.low = -0.95, .high = 0.95}).value_or(m.asymmetry));
+    table.read("asymmetry", m.asymmetry);
 }
 
 double asymmetry(const Surface& s) noexcept {
@@ -96,7 +97,7 @@ Rgb lunar_lambert_mean_albedo(const Surface& s) noexcept {
 }  // namespace
 
 constinit const BsdfKind kinds::lommel_seeliger{.name = "lommel_seeliger",
-                                                .keys = kSeeligerKeys,
+                                                .keys = kSeeligerRows,
                                                 .read = read_lommel_seeliger,
                                                 .f = lommel_seeliger_f,
                                                 .pdf = lommel_seeliger_pdf,
@@ -105,7 +106,7 @@ constinit const BsdfKind kinds::lommel_seeliger{.name = "lommel_seeliger",
 
 constinit const BsdfKind kinds::lunar_lambert{
     .name = "lunar_lambert",
-    .keys = kAlbedoKeys,
+    .keys = kAlbedoRows,
     .read = read_albedo,
     .f = lunar_lambert_f,
     .pdf = lunar_lambert_pdf,

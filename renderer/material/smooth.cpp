@@ -6,10 +6,11 @@
 namespace narpa {
 namespace {
 
-constexpr std::string_view kMirrorKeys[] = {"reflectance"}, kDielectricKeys[] = {"ior", "fresnel"};
+constexpr TableKey kMirrorRows[]{{"reflectance", rows::rgb(kUnit)}};
+constexpr TableKey kDielectricRows[]{{"ior", rows::number({.low = 0.1, .high = 10})}, kFresnelRow};
 
 void read_mirror(TableReader& table, Material& m) {
-    m.specular = table.rgb("reflectance", kUnit).value_or(Rgb{1, 1, 1});
+    m.specular = table.rgb("reflectance").value_or(Rgb{1, 1, 1});
 }
 
 BsdfSample mirror_sample(const Surface& s, const Vec3& n, const Vec3& v, const Random3&) noexcept {
@@ -44,7 +45,7 @@ BsdfSample dielectric_sample(const Surface& s, const Vec3& n, const Vec3& v, con
 }  // namespace
 
 constinit const BsdfKind kinds::mirror{.name = "mirror",
-                                       .keys = kMirrorKeys,
+                                       .keys = kMirrorRows,
                                        .read = read_mirror,
                                        .has_lobe = true,
                                        .is_delta = true,
@@ -53,19 +54,18 @@ constinit const BsdfKind kinds::mirror{.name = "mirror",
                                        .ambient = [](const Surface& s) noexcept { return s.material->specular; },
                                        .largest_albedo = [](const Material& m) noexcept { return m.specular; }};
 
-constinit const BsdfKind kinds::dielectric{
-    .name = "dielectric",
-    .keys = kDielectricKeys,
-    .read = [](TableReader& table, Material& m) { read_fresnel(table, m, 0.1, 10); },
-    .is_delta = true,
-    .sample = dielectric_sample,
-    .ambient =
-        [](const Surface&) noexcept {
-            return Rgb{1, 1, 1};
-        },  // clear glass loses no light
-    .largest_albedo =
-        [](const Material&) noexcept {
-            return Rgb{1, 1, 1};
-        }};
+constinit const BsdfKind kinds::dielectric{.name = "dielectric",
+                                           .keys = kDielectricRows,
+                                           .read = read_fresnel,
+                                           .is_delta = true,
+                                           .sample = dielectric_sample,
+                                           .ambient =
+                                               [](const Surface&) noexcept {
+                                                   return Rgb{1, 1, 1};
+                                               },  // clear glass loses no light
+                                           .largest_albedo =
+                                               [](const Material&) noexcept {
+                                                   return Rgb{1, 1, 1};
+                                               }};
 
 }  // namespace narpa

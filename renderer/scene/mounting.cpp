@@ -8,10 +8,7 @@ namespace narpa {
 
 namespace {
 
-constexpr TableKey kMountingRows[]{
-    {"name", rows::text(), "a text"},    {"mount", rows::text()},   {"position_m", rows::vec3()},
-    {"attitude_wxyz", rows::attitude()}, {"look_at", rows::vec3()}, {"up", rows::vec3()},
-};
+constexpr TableKey kMountingRows[]{kNameRow, kMountRow, kPositionRow, kAttitudeRow, kLookAtRow, kUpRow};
 
 bool allowed_in_name(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
@@ -73,7 +70,6 @@ Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, Atti
 
 std::string read_name(TableReader& table, std::vector<std::string>& taken) {
     constexpr std::size_t kLongest = 64;
-    table.require("name", "a text");
     std::string name = table.text("name").value_or("");
     const bool good =
         !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), allowed_in_name);

@@ -9,7 +9,10 @@
 
 namespace narpa {
 
-/// `name`, `mount`, `position_m`, `attitude_wxyz`, `look_at`, `up`: a part of the keys of what is mounted.
+inline constexpr TableKey kNameRow{"name", rows::text(), "a text"}, kMountRow{"mount", rows::text()},
+    kPositionRow{"position_m", rows::vec3()}, kAttitudeRow{"attitude_wxyz", rows::attitude()},
+    kLookAtRow{"look_at", rows::vec3()}, kUpRow{"up", rows::vec3()};
+/// All of these rows: a part of the keys of sensors.
 extern const TableKeys kMountingKeys;
 
 struct Mounting {

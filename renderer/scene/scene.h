@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -89,6 +90,8 @@ struct Light {
         rectangle,    ///< emission is the radiance of its +z side, W m^-2 sr^-1 a band; seen by cameras and mirrors
         disc,         ///< the same
     };
+    static constexpr std::array<std::string_view, 4> kKindNames{"point", "directional", "rectangle", "disc"};
+
     std::string name;
     Kind kind = Kind::point;
     int mount = -1;  ///< body it rides on; -1 is the world
@@ -142,6 +145,8 @@ struct RenderSettings {
         direct,  ///< light that reaches a surface straight from the Sun and the lights, with shadows, and ambient
         path,    ///< all light, by path tracing
     };
+    static constexpr std::array<std::string_view, 2> kMethodNames{"direct", "path"};
+
     Method method = Method::direct;
     int max_depth = 8;              ///< path: surfaces that a path may meet, 1..40 (1 is direct light alone)
     int spp = 1;                    ///< samples per pixel where there is no budget

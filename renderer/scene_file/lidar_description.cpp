@@ -25,10 +25,8 @@ constexpr int kMaxBeams = 256;
 /// Whether cells have equal steps of the tangent or of the angle across the field of view.
 enum class Spacing : std::uint8_t { tangents, angles };
 enum class Scan : std::uint8_t { flash, rows, columns };
-constexpr std::array<std::pair<std::string_view, Spacing>, 2> kSpacings{
-    {{"tangents", Spacing::tangents}, {"angles", Spacing::angles}}};
-constexpr std::array<std::pair<std::string_view, Scan>, 3> kScans{
-    {{"flash", Scan::flash}, {"rows", Scan::rows}, {"columns", Scan::columns}}};
+constexpr std::array<std::string_view, 2> kSpacingNames{"tangents", "angles"};
+constexpr std::array<std::string_view, 3> kScanNames{"flash", "rows", "columns"};
 
 constexpr TableKey kHeadRows[]{
     {"based_on", rows::file()},
@@ -49,8 +47,8 @@ constexpr TableKey kGridRows[]{
     {"rows", rows::integer(1, 65535), "a count"},
     {"fov_horizontal_deg", rows::number({.low = 0, .high = 360, .low_open = true}), "an angle"},
     {"fov_vertical_deg", rows::number({.low = 0, .high = 180, .low_open = true}), "an angle"},
-    {"spacing", rows::choice<kSpacings>()},
-    {"scan", rows::choice<kScans>()},
+    {"spacing", rows::choice<kSpacingNames>()},
+    {"scan", rows::choice<kScanNames>()},
     {"two_way", rows::boolean()},
     {"scan_share", rows::number(kShare)},
 };
@@ -126,14 +124,14 @@ void read_grid(TableReader table, LidarPattern& pattern) {
     Grid g;
     table.read("columns", g.columns);
     table.read("rows", g.rows);
-    g.spacing = table.choice("spacing", kSpacings).value_or(Spacing::tangents);
+    table.read("spacing", g.spacing);
     const double most = g.spacing == Spacing::tangents ? 170 : 360;
     const auto fov = [&](const char* key, double limit) {
         return kRadPerDeg * table.number(key, {.low = 0, .high = limit, .low_open = true}).value_or(1);
     };
     g.horizontal_rad = fov("fov_horizontal_deg", most);
     g.vertical_rad = fov("fov_vertical_deg", std::min(most, 180.0));
-    g.scan = table.choice("scan", kScans).value_or(Scan::flash);
+    table.read("scan", g.scan);
     table.read("two_way", g.two_way);
     table.read("scan_share", g.scan_share);
     if (g.scan == Scan::flash)

@@ -11,11 +11,33 @@ namespace narpa {
 namespace {
 
 using Planet = AirDescription::Planet;
-constexpr std::array<std::pair<std::string_view, Planet>, 2> kPlanets{
-    {{"earth", Planet::earth}, {"mars", Planet::mars}}};
-constexpr std::array<std::pair<std::string_view, int>, 1> kSkies{{{"hosek-wilkie", 0}}};
-constexpr Range kTurbidity{.low = 1, .high = 10};
+constexpr std::array<std::string_view, 2> kPlanetNames{"earth", "mars"};
+constexpr std::array<std::string_view, 1> kSkyNames{"hosek-wilkie"};
 constexpr Range kAirHeight{.low = 100, .high = 1e5};
+constexpr TableKey kTurbidityRow{"turbidity", rows::number({.low = 1, .high = 10})},
+    kGroundAlbedoRow{"ground_albedo", rows::number(kUnit)};
+constexpr TableKey kAtmosphereRows[]{
+    {"body", rows::text(), "the name of the [[body]] that the air surrounds"},
+    {"planet", rows::choice<kPlanetNames>()},
+    kTurbidityRow,
+    {"ozone_du", rows::number({.low = 0, .high = 1000})},
+    {"dust_depth", rows::number({.low = 0, .high = 10})},
+    {"top_m", rows::number({.low = 1e4, .high = 5e5})},
+    {"gas_height_m", rows::number(kAirHeight)},
+    {"aerosol_height_m", rows::number(kAirHeight)},
+    {"gas_amount", rows::number({.low = 0, .high = 100})},
+    {"lidar_ratio_sr", rows::number({.low = 1, .high = 1000})},
+    kGroundAlbedoRow,
+    {"ground_radius_m", rows::number({.low = 1e5, .high = 1e9})},
+    {"samples_per_band", rows::integer(1, Air::kMaxPerBand)},
+    {"steps", rows::integer(4, 32)},
+};
+constexpr TableKey kSkyRows[]{
+    {"model", rows::choice<kSkyNames>(), "\"hosek-wilkie\""},
+    kTurbidityRow,
+    kGroundAlbedoRow,
+    {"up", rows::direction()},
+};
 
 /// Radius of the sphere with the body's volume; nullopt for a mesh.
 std::optional<double> mean_radius_m(const Body& body) {
@@ -27,7 +49,6 @@ std::optional<double> mean_radius_m(const Body& body) {
 
 /// Index of the body that is named; -1 and a problem otherwise.
 int planet_body(TableReader& table, const std::vector<Body>& bodies) {
-    table.require("body", "the name of the [[body]] that the air surrounds");
     const auto name = table.text("body");
     if (!name) return -1;
     for (std::size_t i = 0; i < bodies.size(); ++i)
@@ -44,7 +65,7 @@ bool names_texture(const SceneReading& reading, int material) {
 
 void read_ground(TableReader& table, const Body& body, const SceneReading& reading, AirDescription& air) {
     const std::optional<double> own = mean_radius_m(body);
-    const auto radius = table.number("ground_radius_m", {.low = 1e5, .high = 1e9});
+    const auto radius = table.number("ground_radius_m");
     if (own && radius)
         table.fail("ground_radius_m", "the body has a radius of its own, expected none here");
     else if (own && !(*own >= 1e5 && *own <= 1e9))
@@ -59,25 +80,24 @@ void read_ground(TableReader& table, const Body& body, const SceneReading& readi
         if (m.kind == &kinds::lambert && !names_texture(reading, material))
             air.ground_albedo = std::min(1.0, static_cast<double>(mean_band(m.diffuse)));
     }
-    air.ground_albedo = table.number("ground_albedo", kUnit).value_or(air.ground_albedo);
+    table.read("ground_albedo", air.ground_albedo);
 }
 
 void read_air(TableReader& table, AirDescription& air) {
-    air.top_m = table.number("top_m", {.low = 1e4, .high = 5e5}).value_or(air.top_m);
-    air.gas_height_m = table.number("gas_height_m", kAirHeight).value_or(air.gas_height_m);
-    air.aerosol_height_m = table.number("aerosol_height_m", kAirHeight).value_or(air.aerosol_height_m);
-    air.gas_amount = table.number("gas_amount", {.low = 0, .high = 100}).value_or(air.gas_amount);
-    air.aerosol_lidar_ratio_sr = table.number("lidar_ratio_sr", {.low = 1, .high = 1000}).value_or(0);
-    const bool earth = air.planet == Planet::earth;
-    if (earth) {
+    table.read("top_m", air.top_m);
+    table.read("gas_height_m", air.gas_height_m);
+    table.read("aerosol_height_m", air.aerosol_height_m);
+    table.read("gas_amount", air.gas_amount);
+    table.read("lidar_ratio_sr", air.aerosol_lidar_ratio_sr);
+    if (air.planet == Planet::earth) {
         table.refuse("dust_depth", "belongs to planet = \"mars\"; the Earth's aerosol has a \"turbidity\"");
     } else {
         for (const std::string_view key : {"turbidity", "ozone_du"})
             table.refuse(key, "belongs to planet = \"earth\"; the dust of Mars has a \"dust_depth\"");
     }
-    air.turbidity = table.number("turbidity", kTurbidity).value_or(air.turbidity);
-    air.ozone_du = table.number("ozone_du", {.low = 0, .high = 1000}).value_or(air.ozone_du);
-    air.aerosol_depth = table.number("dust_depth", {.low = 0, .high = 10}).value_or(air.aerosol_depth);
+    table.read("turbidity", air.turbidity);
+    table.read("ozone_du", air.ozone_du);
+    table.read("dust_depth", air.aerosol_depth);
 }
 
 void read_planet_air(TableReader& root, SceneReading& reading) {
@@ -86,13 +106,13 @@ void read_planet_air(TableReader& root, SceneReading& reading) {
     Atmosphere a;
     Scene& scene = reading.scene;
     a.body = planet_body(*table, scene.bodies);
-    const Planet planet = table->choice<Planet>("planet", kPlanets).value_or(Planet::earth);
+    Planet planet = Planet::earth;
+    table->read("planet", planet);
     a.air = planet == Planet::earth ? earth_air() : mars_air();
     if (a.body >= 0) read_ground(*table, scene.bodies[static_cast<std::size_t>(a.body)], reading, a.air);
     read_air(*table, a.air);
-    a.samples_per_band =
-        static_cast<int>(table->integer("samples_per_band", 1, Air::kMaxPerBand).value_or(a.samples_per_band));
-    a.steps = static_cast<int>(table->integer("steps", 4, 32).value_or(a.steps));
+    table->read("samples_per_band", a.samples_per_band);
+    table->read("steps", a.steps);
     table->finish();
     if (a.body >= 0) scene.atmosphere = a;
 }
@@ -100,12 +120,11 @@ void read_planet_air(TableReader& root, SceneReading& reading) {
 void read_sky(TableReader& root, SceneReading& reading) {
     auto table = root.table("sky");
     if (!table) return;
-    table->require("model", "\"hosek-wilkie\"");
-    (void)table->choice<int>("model", kSkies);
+    (void)table->word("model");
     AnalyticSky sky;
     sky.up = table->direction("up").value_or(sky.up);
-    sky.turbidity = table->number("turbidity", kTurbidity).value_or(sky.turbidity);
-    sky.ground_albedo = table->number("ground_albedo", kUnit).value_or(sky.ground_albedo);
+    table->read("turbidity", sky.turbidity);
+    table->read("ground_albedo", sky.ground_albedo);
     table->finish();
     if (!reading.scene.sun) {
         root.fail("sky", "a sky is lit by the Sun, expected a [sun]");
@@ -120,6 +139,8 @@ void read_sky(TableReader& root, SceneReading& reading) {
 }
 
 }  // namespace
+
+constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows}, kSkyKeys{.rows = kSkyRows};
 
 void read_atmosphere(TableReader& root, SceneReading& reading) {
     read_planet_air(root, reading);

@@ -13,19 +13,38 @@ namespace {
 constexpr std::int64_t kIdsPerBody = 16, kLastBaseId = 0x5f0;
 
 constexpr Range kBodyLength{.low = 0, .high = 1e15, .low_open = true};
+constexpr TableKey kSphereRows[]{{"radius_m", rows::number(kBodyLength), "a number > 0"}};
+constexpr TableKey kEllipsoidRows[]{
+    {"semi_axes_m", rows::vec3(kBodyLength), "[a, b, c], the half lengths along the body's x, y and z"}};
+constexpr TableKeys kSphereKeys{.rows = kSphereRows}, kEllipsoidKeys{.rows = kEllipsoidRows};
+constexpr TableKey kBodyRows[]{
+    kNameRow,
+    {"mesh", rows::file()},
+    {"sphere", rows::table(kSphereKeys)},
+    {"ellipsoid", rows::table(kEllipsoidKeys)},
+    {"dem", rows::or_file(rows::table(kDemKeys))},
+    {"scale", rows::number({.low = 0, .high = 1e12, .low_open = true})},
+    {"crease_angle_deg", rows::number({.low = 0, .high = 180})},
+    kPositionRow,
+    kAttitudeRow,
+    {"velocity_m_s", rows::vec3()},
+    {"orbit", rows::table(kOrbitKeys)},
+    {"rate_rad_s", rows::vec3()},
+    {"rotation", rows::choice<kRotatingBodies>()},
+    {"can_id", rows::integer(0, kLastBaseId)},
+    {"material", rows::table(kMaterialKeys)},
+};
 
 Sphere read_sphere(TableReader& table, int material) {
     Sphere sphere{.material = material};
-    table.require("radius_m", "a number > 0");
-    sphere.radius_m = table.number("radius_m", kBodyLength).value_or(sphere.radius_m);
+    table.read("radius_m", sphere.radius_m);
     table.finish();
     return sphere;
 }
 
 Ellipsoid read_ellipsoid(TableReader& table, int material) {
     Ellipsoid ellipsoid{.material = material};
-    table.require("semi_axes_m", "[a, b, c], the half lengths along the body's x, y and z");
-    ellipsoid.semi_axes_m = table.vec3("semi_axes_m", kBodyLength).value_or(ellipsoid.semi_axes_m);
+    table.read("semi_axes_m", ellipsoid.semi_axes_m);
     table.finish();
     return ellipsoid;
 }
@@ -35,8 +54,8 @@ NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<
     if (file.empty()) table.fail("mesh", "expected the name of a mesh file");
     return {.body = reading.scene.bodies.size(),
             .path = (reading.folder / file).string(),
-            .scale = table.number("scale", {.low = 0, .high = 1e12, .low_open = true}).value_or(1),
-            .crease_rad = kRadPerDeg * table.number("crease_angle_deg", {.low = 0, .high = 180}).value_or(0),
+            .scale = table.number("scale").value_or(1),
+            .crease_rad = kRadPerDeg * table.number("crease_angle_deg").value_or(0),
             .material = material,
             .place = table.place("mesh")};
 }
@@ -77,7 +96,7 @@ void read_shape(TableReader& table, Body& body, SceneReading& reading) {
 }
 
 void read_can_id(TableReader& table, Body& body, const std::vector<Body>& others) {
-    const auto id = table.integer("can_id", 0, kLastBaseId);
+    const auto id = table.integer("can_id");
     if (!id) return;
     if (*id % kIdsPerBody != 0) {
         table.fail("can_id",
@@ -109,13 +128,15 @@ void read_rotation(TableReader& table, Motion& motion, const SceneReading& readi
 }
 
 void read_motion(TableReader& table, Motion& motion) {
-    motion.T_world_body.t = table.vec3("position_m").value_or(Vec3{});
-    motion.T_world_body.q = table.attitude("attitude_wxyz").value_or(Quat{});
-    motion.velocity_m_s = table.vec3("velocity_m_s").value_or(Vec3{});
-    motion.rate_rad_s = table.vec3("rate_rad_s").value_or(Vec3{});
+    table.read("position_m", motion.T_world_body.t);
+    table.read("attitude_wxyz", motion.T_world_body.q);
+    table.read("velocity_m_s", motion.velocity_m_s);
+    table.read("rate_rad_s", motion.rate_rad_s);
 }
 
 }  // namespace
+
+constinit const TableKeys kBodyKeys{.rows = kBodyRows};
 
 void read_bodies(TableReader& root, SceneReading& reading) {
     std::vector<std::string> names;

@@ -15,46 +15,60 @@ namespace {
 
 constexpr Range kDemFactor{.low = -1e9, .high = 1e9};
 constexpr Range kDemLength{.low = 0, .high = 1e9, .low_open = true};
-constexpr int kMaxPathPoints = 256;
 constexpr double kPixelsPerRadWithoutCamera = 1000;
 
-constexpr std::array<std::pair<std::string_view, DemRequest::On>, 3> kGrounds{
-    {{"plane", DemRequest::On::plane},
-     {"ellipsoid", DemRequest::On::ellipsoid},
-     {"tangent", DemRequest::On::tangent}}};
-constexpr std::array<std::pair<std::string_view, bool>, 2> kHeightKinds{{{"heights", false}, {"radii", true}}};
+constexpr std::array<std::string_view, 3> kGroundNames{"plane", "ellipsoid", "tangent"};  // of DemRequest::On
+constexpr std::array<std::string_view, 2> kHeightNames{"heights", "radii"};
+constexpr TableKey kDetailRows[]{
+    {"posts", rows::integer(2, 64), "how many times finer than the DEM, 2 to 64"},
+    // From 2.4 on, cells would hold more craters than DetailedSource draws.
+    {"craters_per_m2", rows::number(kUnit)},
+    {"rocks_share", rows::number({.low = 0, .high = 0.5})},
+    {"seed", rows::integer(0, 1'000'000'000)},
+};
+constexpr TableKeys kDetailKeys{.rows = kDetailRows};
+constexpr TableKey kDemRows[]{
+    {"file", rows::file(), "the name of a DEM"},
+    {"on", rows::choice<kGroundNames>()},
+    {"has", rows::choice<kHeightNames>()},
+    {"scale", rows::number(kDemFactor)},
+    {"offset_m", rows::number(kDemFactor)},
+    {"no_data", rows::number()},
+    {"post_spacing_m", rows::number(kDemLength)},
+    {"ellipsoid_m", rows::pair(kDemLength)},
+    {"error_px", rows::number({.low = 0.001, .high = 1000})},
+    {"error_m", rows::number(kDemLength)},
+    {"seen_from_m", rows::points(256)},
+    {"budget_mib", rows::integer(1, 1 << 20)},
+    {"detail", rows::table(kDetailKeys)},
+};
 
 TerrainDetail read_detail(TableReader& table) {
     TerrainDetail d;
-    table.require("posts", "how many times finer than the DEM, 2 to 64");
-    d.refinement_factor = static_cast<int>(table.integer("posts", 2, 64).value_or(2));
-    // From 2.4 on, cells would hold more craters than DetailedSource draws.
-    d.craters = table.number("craters_per_m2", {.low = 0, .high = 1}).value_or(0);
-    d.rocks = table.number("rocks_share", {.low = 0, .high = 0.5}).value_or(0);
-    d.seed = static_cast<std::uint64_t>(table.integer("seed", 0, 1'000'000'000).value_or(0));
+    table.read("posts", d.refinement_factor);
+    table.read("craters_per_m2", d.craters);
+    table.read("rocks_share", d.rocks);
+    table.read("seed", d.seed);
     table.finish();
     return d;
 }
 
 DemRequest read_request(TableReader& table, const SceneReading& reading) {
     DemRequest r;
-    table.require("file", "the name of a DEM");
     const std::string file = table.text("file").value_or("");
     if (table.has("file") && file.empty()) table.fail("file", "expected the name of a DEM");
     r.path = (reading.folder / file).string();
-    r.on = table.choice<DemRequest::On>("on", kGrounds).value_or(r.on);
-    r.radii = table.choice<bool>("has", kHeightKinds).value_or(false);
-    r.scale = table.number("scale", kDemFactor).value_or(r.scale);
-    r.offset_m = table.number("offset_m", kDemFactor).value_or(r.offset_m);
-    r.no_data = table.number("no_data").value_or(r.no_data);
-    r.post_spacing_m = table.number("post_spacing_m", kDemLength).value_or(r.post_spacing_m);
-    if (const auto axes = table.pair("ellipsoid_m", kDemLength))
-        r.equatorial_m = (*axes)[0], r.polar_m = (*axes)[1];
-    r.options.error_px = table.number("error_px", {.low = 0.001, .high = 1000}).value_or(r.options.error_px);
-    r.options.error_m = table.number("error_m", kDemLength).value_or(r.options.error_m);
-    r.options.seen_from = table.points("seen_from_m", kMaxPathPoints).value_or(std::vector<Vec3>{});
-    r.options.budget_bytes = static_cast<std::uint64_t>(table.integer("budget_mib", 1, 1 << 20).value_or(1024))
-                             << 20;
+    table.read("on", r.on);
+    r.radii = table.word("has") == 1u;
+    table.read("scale", r.scale);
+    table.read("offset_m", r.offset_m);
+    table.read("no_data", r.no_data);
+    table.read("post_spacing_m", r.post_spacing_m);
+    if (const auto axes = table.pair("ellipsoid_m")) r.equatorial_m = (*axes)[0], r.polar_m = (*axes)[1];
+    table.read("error_px", r.options.error_px);
+    table.read("error_m", r.options.error_m);
+    r.options.seen_from = table.points("seen_from_m").value_or(std::vector<Vec3>{});
+    r.options.budget_bytes = static_cast<std::uint64_t>(table.integer("budget_mib").value_or(1024)) << 20;
     if (auto detail = table.table("detail")) r.detail = read_detail(*detail);
     table.finish();
     return r;
@@ -131,6 +145,8 @@ void load_dem(const NamedDem& named, SceneReading& reading) {
 }
 
 }  // namespace
+
+constinit const TableKeys kDemKeys{.rows = kDemRows};
 
 void read_dem(TableReader& body, int material, SceneReading& reading) {
     NamedDem named{

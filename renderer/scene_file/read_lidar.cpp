@@ -17,15 +17,10 @@ namespace {
 constexpr Range kLength{.low = 0, .high = 1e3};
 
 using Multipath = LidarReceiverModel::Multipath;
-constexpr std::array<std::pair<std::string_view, Multipath>, 3> kMultipaths{
-    {{"none", Multipath::none}, {"mirrors", Multipath::mirrors}, {"diffuse", Multipath::diffuse}}};
+constexpr std::array<std::string_view, 3> kMultipathNames{"none", "mirrors", "diffuse"};
+constexpr std::array<std::string_view, 4> kPpsNames{"absent", "synchronising", "locked", "error"};
 constexpr std::array<std::pair<std::string_view, LidarReturns>, 3> kReturns{
     {{"strongest", LidarReturns::strongest}, {"last", LidarReturns::last}, {"dual", LidarReturns::dual}}};
-constexpr std::array<std::pair<std::string_view, LidarPps>, 4> kPpsStates{
-    {{"absent", LidarPps::absent},
-     {"synchronising", LidarPps::synchronising},
-     {"locked", LidarPps::locked},
-     {"error", LidarPps::error}}};
 
 std::vector<std::string_view> make_names() {
     std::vector<std::string_view> names;
@@ -45,7 +40,7 @@ std::vector<std::string_view> profile_names() {
 constexpr TableKey kLidarRows[]{
     {"model", rows::or_file(rows::choice(make_names)), "\"VLP-16\""},
     {"rate_hz", rows::number({.low = 0, .high = 1e4, .low_open = true})},
-    {"pps", rows::choice<kPpsStates>()},
+    {"pps", rows::choice<kPpsNames>()},
     {"returns", rows::choice<kReturns>()},
     {"profile", rows::choice(profile_names)},
     {"columns", rows::integer(1, 65536)},
@@ -55,7 +50,7 @@ constexpr TableKey kLidarRows[]{
     {"beam_divergence_rad", rows::number({.low = 0, .high = 0.1})},
     {"sub_rays", rows::integer(1, LidarReceiverModel::kMaxSubRays)},
     {"pulse_length_m", rows::number(kLength)},
-    {"multipath", rows::choice<kMultipaths>()},
+    {"multipath", rows::choice<kMultipathNames>()},
     {"range_at_10_percent_m", rows::number({.low = 0, .high = 1e6, .low_open = true})},
     {"detection_snr", rows::number(kLength)},
     {"sunlight_noise", rows::number({.low = 0, .high = 1e6})},
@@ -77,7 +72,7 @@ void read_beam(TableReader& table, LidarReceiverModel& r) {
     if (r.sub_rays > 1 && r.beam_divergence_rad == 0)
         table.require("beam_divergence_rad", "a number > 0, as sub_rays sample the beam's cone");
     table.read("pulse_length_m", r.pulse_length_m);
-    r.multipath = table.choice("multipath", kMultipaths).value_or(Multipath::none);
+    table.read("multipath", r.multipath);
 }
 
 void read_detection(TableReader& table, LidarReceiverModel& r) {
@@ -149,7 +144,7 @@ LidarSettings read_settings(TableReader& table, const LidarMake& make, const std
     LidarSettings settings;
     settings.rate_hz =
         table.number("rate_hz", {.low = make.rate_hz_min, .high = make.rate_hz_max}).value_or(make.rate_hz_default);
-    settings.pps = table.choice("pps", kPpsStates).value_or(LidarPps::locked);
+    table.read("pps", settings.pps);
     if (make.complete) {
         read_mode(table, make, folder, settings);
         return settings;

@@ -3,7 +3,7 @@
 #include <array>
 
 #include "renderer/material/albedo.h"
-#include "renderer/material/bsdf_kind.h"
+#include "renderer/material/material_keys.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -12,7 +12,16 @@ namespace {
 
 /// Thick clouds reflect 0.6 to 0.9 (K. N. Liou, An Introduction to Atmospheric Radiation, 2nd ed. 2002).
 constexpr Rgb kCloudAlbedo{0.75f, 0.75f, 0.75f};
-constexpr Range kRadiance{.low = 0, .high = 1e30};
+constexpr TableKey kMaterialRows[]{
+    {"kind", rows::kind("lambert")},
+    {"retroreflectance", rows::number({.low = 0, .high = 1e6})},
+    {"emission", rows::rgb({.low = 0, .high = 1e30})},
+    {"emission_texture", kColourTexture},
+    {"normal_texture", kDataTexture},
+    {"normal_scale", rows::number({.low = 0, .high = 100})},
+    {"height_texture", kDataTexture},
+    {"bump_height_m", rows::number({.low = -1e6, .high = 1e6})},
+};
 
 /// Records a problem where the surface would reflect more than it receives.
 void check_energy(TableReader& table, const Material& m) {
@@ -30,17 +39,11 @@ void check_energy(TableReader& table, const Material& m) {
 
 /// {file = "FILE", wrap = ..., colour = ...}; the last for colours only.
 void read_texture_table(TableReader table, std::string& file, TextureUse& use) {
-    using Wrap = Texture::Wrap;
     using Colour = TextureUse::Colour;
-    static constexpr std::array<std::pair<std::string_view, Wrap>, 2> kWraps{
-        {{"repeat", Wrap::repeat}, {"clamp", Wrap::clamp}}};
-    static constexpr std::array<std::pair<std::string_view, Colour>, 2> kColours{
-        {{"srgb", Colour::srgb}, {"linear", Colour::linear}}};
-    table.require("file", "the name of an image file");
-    file = table.text("file").value_or("");
-    use.wrap = table.choice<Wrap>("wrap", kWraps).value_or(use.wrap);
+    table.read("file", file);
+    table.read("wrap", use.wrap);
     if (use.colour == Colour::by_depth) {
-        use.colour = table.choice<Colour>("colour", kColours).value_or(use.colour);
+        if (const auto named = table.word("colour")) use.colour = *named == 0 ? Colour::srgb : Colour::linear;
     } else {
         table.refuse("colour", "this image holds data, which is linear");
     }
@@ -76,38 +79,24 @@ void read_textures(TableReader& table, Material& m, SceneReading& reading) {
     read_texture_key(table, "specular_texture", &Material::specular_texture, {.colour = Colour::linear}, reading);
     read_texture_key(table, "cloud_texture", &Material::cloud_texture, {.colour = Colour::linear}, reading);
     if (!table.has("cloud_texture")) table.refuse("cloud_albedo", "belongs to cloud_texture, which is not here");
-    if (table.has("cloud_texture")) m.cloud_albedo = table.rgb("cloud_albedo", kUnit).value_or(kCloudAlbedo);
+    if (table.has("cloud_texture")) m.cloud_albedo = table.rgb("cloud_albedo").value_or(kCloudAlbedo);
     read_texture_key(table, "normal_texture", &Material::normal_texture, {.colour = Colour::normals}, reading);
     read_texture_key(table, "height_texture", &Material::height_texture, {.colour = Colour::linear}, reading);
     if (table.has("emission_texture") && !table.has("emission"))
         table.fail("emission_texture", "multiplies the \"emission\", which is not here");
-    m.normal_scale =
-        static_cast<float>(table.number("normal_scale", {.low = 0, .high = 100}).value_or(m.normal_scale));
-    m.bump_height_m = static_cast<float>(table.number("bump_height_m", {.low = -1e6, .high = 1e6}).value_or(0));
+    table.read("normal_scale", m.normal_scale);
+    table.read("bump_height_m", m.bump_height_m);
     if (!table.has("normal_texture")) table.refuse("normal_scale", "belongs to normal_texture, which is not here");
     if (!table.has("height_texture")) table.refuse("bump_height_m", "belongs to height_texture, which is not here");
     if (table.has("height_texture")) table.require("bump_height_m", "a number: how high white stands above black");
 }
 
-void refuse_keys_of_other_kinds(TableReader& table, const BsdfKind& kind) {
-    static const std::vector<KindKeys> all = [] {
-        std::vector<KindKeys> keys;
-        for (const BsdfKind* k : bsdf_kinds()) keys.push_back({k->name, {k->keys.begin(), k->keys.end()}});
-        return keys;
-    }();
-    table.refuse_keys_of_other_kinds(kind.name, all);
-    for (const KindKeys& keys : all)
-        for (const std::string_view key : keys.keys) (void)table.has(key);  // suggested for misspelt keys, too
-}
-
 /// Reads everything but the kind.
 void read_parameters(TableReader& table, Material& m, SceneReading& reading) {
-    refuse_keys_of_other_kinds(table, *m.kind);
     m.kind->read(table, m);
     if (reading.problems.none()) check_energy(table, m);
-    m.retroreflectance =
-        static_cast<float>(table.number("retroreflectance", {.low = 0, .high = 1e6}).value_or(m.retroreflectance));
-    m.emission = table.rgb("emission", kRadiance).value_or(Rgb{});
+    table.read("retroreflectance", m.retroreflectance);
+    table.read("emission", m.emission);
     read_textures(table, m, reading);
     if (m.kind->direct_only && reading.scene.render.method == RenderSettings::Method::path)
         table.fail("kind",
@@ -117,16 +106,22 @@ void read_parameters(TableReader& table, Material& m, SceneReading& reading) {
 
 }  // namespace
 
+constinit const TableKeys kMaterialKeys{.rows = kMaterialRows, .kinds = [] {
+                                            std::vector<TableKind> kinds;
+                                            for (const BsdfKind* k : bsdf_kinds())
+                                                kinds.push_back({k->name, k->keys});
+                                            return kinds;
+                                        }};
+
 std::optional<int> read_material(TableReader& body, const std::string& name, SceneReading& reading) {
     auto table = body.table("material");
     if (!table) return std::nullopt;
     Material m;
     m.name = name;
-    std::vector<std::pair<std::string_view, const BsdfKind*>> names;
-    for (const BsdfKind* k : bsdf_kinds()) names.emplace_back(k->name, k);
-    const auto kind = table->choice<const BsdfKind*>("kind", names);
-    if (kind) m.kind = *kind;
-    if (kind || !table->has("kind")) read_parameters(*table, m, reading);
+    if (const auto kind = table->kind()) {
+        m.kind = bsdf_kinds()[*kind];
+        read_parameters(*table, m, reading);
+    }
     reading.scene.materials.push_back(std::move(m));
     return static_cast<int>(reading.scene.materials.size()) - 1;
 }

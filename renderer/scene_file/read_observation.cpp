@@ -71,7 +71,7 @@ constinit const TableKeys kObserverKeys{.rows = kObserverRows}, kOrbitKeys{.rows
     kTrackingKeys{.rows = kTrackingRows};
 
 void read_orbit(TableReader& body_table, Body& body) {
-    auto table = body_table.table("orbit", &kOrbitKeys);
+    auto table = body_table.table("orbit");
     if (!table) return;
     for (const std::string_view key : {"position_m", "velocity_m_s"})
         body_table.refuse(key, "the body has an orbit, which gives it; expected one of the two");
@@ -117,7 +117,7 @@ void read_observer(TableReader& root, SceneReading& reading) {
 
 void read_tracking(TableReader& table, const SceneReading& reading, Camera& camera) {
     const auto track = table.text("track");
-    const auto pointing = table.pair("azimuth_elevation_deg", kAngle_deg);
+    const auto pointing = table.pair("azimuth_elevation_deg");
     if (!track && !pointing) return;
     const char* const key = track ? "track" : "azimuth_elevation_deg";
     if (track && pointing) return table.fail(key, "there is an azimuth_elevation_deg too, expected one of the two");

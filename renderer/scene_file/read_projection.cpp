@@ -7,7 +7,7 @@
 
 #include "base/constants.h"
 #include "renderer/assets/calibration_file.h"
-#include "renderer/projection/kannala_brandt.h"
+#include "renderer/projection/projection_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -15,46 +15,68 @@ namespace {
 
 constexpr std::array kKeys{"intrinsics", "fov_diagonal_deg", "fov_horizontal_deg", "calibration"};
 
+/// The kinds that have a name of this sort.
+template <std::string_view ProjectionKind::*name>
+std::vector<TableKind> named_projections() {
+    std::vector<TableKind> kinds;
+    for (const ProjectionKind* kind : projection_kinds())
+        if (!(kind->*name).empty()) kinds.push_back({kind->*name, kind->keys});
+    return kinds;
+}
+
+constexpr TableKey kIntrinsicsRows[]{
+    {"fx", rows::number(kPositive), "a focal length in pixels"},
+    {"fy", rows::number(kPositive), "a focal length in pixels"},
+    {"cx", rows::number()},
+    {"cy", rows::number()},
+};
+constexpr TableKey kProjectionKindRows[]{{"kind", rows::kind(), "the name of a projection"}};
+constexpr TableKey kDistortionRows[]{{"model", rows::kind(), "\"opencv\" or \"fisheye\""}};
+constexpr TableKeys kIntrinsicsKeys{.rows = kIntrinsicsRows};
+constexpr TableKeys kProjectionKindKeys{.rows = kProjectionKindRows,
+                                        .kinds = named_projections<&ProjectionKind::name>};
+constexpr TableKeys kDistortionKeys{.rows = kDistortionRows, .kinds = named_projections<&ProjectionKind::opencv>};
+/// The kind of projection narrows it.
+constexpr Range kFieldOfView{.low = 0, .high = 360, .low_open = true, .high_open = true};
+constexpr TableKey kProjectionRows[]{
+    {"resolution", rows::size(kMaxPixelsPerSide)},
+    {"intrinsics", rows::table(kIntrinsicsKeys)},
+    {"fov_diagonal_deg", rows::number(kFieldOfView)},
+    {"fov_horizontal_deg", rows::number(kFieldOfView)},
+    {"calibration", rows::file()},
+    {"projection", rows::table(kProjectionKindKeys)},
+    {"distortion", rows::table(kDistortionKeys)},
+};
+
 void read_intrinsics(TableReader& table, Pinhole& pinhole) {
-    for (const char* key : {"fx", "fy"}) table.require(key, "a focal length in pixels");
-    pinhole.fx = table.number("fx", kPositive).value_or(1);
-    pinhole.fy = table.number("fy", kPositive).value_or(1);
-    pinhole.cx = table.number("cx").value_or(pinhole.cx);
-    pinhole.cy = table.number("cy").value_or(pinhole.cy);
+    table.read("fx", pinhole.fx);
+    table.read("fy", pinhole.fy);
+    table.read("cx", pinhole.cx);
+    table.read("cy", pinhole.cy);
     table.finish();
 }
 
-/// `key = {kind_key = ..., parameters}`; a pinhole where there is no such table.
-ProjectionParameters read_kind(TableReader& camera, const char* key, const char* kind_key,
-                               std::string_view ProjectionKind::*name) {
+/// A pinhole where there is no such table.
+ProjectionParameters read_kind(TableReader& camera, const char* key, const TableKeys& keys,
+                               const ProjectionKind* (*kind_of)(std::string_view name)) {
     ProjectionParameters p{&kPinhole};
     auto table = camera.table(key);
     if (!table) return p;
-    std::vector<std::pair<std::string_view, const ProjectionKind*>> kinds;
-    for (const ProjectionKind* kind : projection_kinds())
-        if (!(kind->*name).empty()) kinds.emplace_back(kind->*name, kind);
-    table->require(kind_key, "\"opencv\" or \"fisheye\"");
-    p.kind = table->choice<const ProjectionKind*>(kind_key, kinds).value_or(&kPinhole);
+    if (const auto kind = table->kind()) p.kind = kind_of(keys.kinds()[*kind].name);
     for (const TableKey& row : p.kind->keys) {
-        table->require(row.name, row.required);
-        if (row.value.type == KeyValue::Type::numbers) {
-            p.values = p.kind == &kKannalaBrandt
-                           ? table->numbers(row.name, {4}).value_or(std::vector<double>(4))
-                           : table->numbers(row.name, {4, 5, 8, 12}).value_or(std::vector<double>(4));
-        } else {
-            p.values.push_back(table->number(row.name, row.value.range).value_or(0));
-        }
+        if (row.value.type == KeyValue::Type::numbers)
+            p.values = table->numbers(row.name).value_or(std::vector<double>(4));
+        else
+            p.values.push_back(table->number(row.name).value_or(0));
     }
     table->finish();
     return p;
 }
 
 ProjectionParameters read_projection_kind(TableReader& camera) {
-    if (camera.has("projection")) {
-        camera.refuse("distortion", "there is a projection already, expected one of the two");
-        return read_kind(camera, "projection", "kind", &ProjectionKind::name);
-    }
-    return read_kind(camera, "distortion", "model", &ProjectionKind::opencv);
+    if (!camera.has("projection")) return read_kind(camera, "distortion", kDistortionKeys, opencv_kind);
+    camera.refuse("distortion", "there is a projection already, expected one of the two");
+    return read_kind(camera, "projection", kProjectionKindKeys, projection_kind);
 }
 
 /// The focal length with which the image spans `angle` from edge to edge along the unit image direction (x, y),
@@ -70,7 +92,8 @@ double focal_length(ProjectionParameters p, double angle, double x, double y, do
 }
 
 void read_field_of_view(TableReader& table, const Camera& camera, ProjectionParameters& p) {
-    const Range angle{.low = 0, .high = p.kind->fov_max_deg, .low_open = true, .high_open = true};
+    Range angle = kFieldOfView;
+    angle.high = p.kind->fov_max_deg;
     const double diagonal_px = std::hypot(camera.width, camera.height);
     const auto take = [&](const char* key, double x, double y, double extent_px) {
         const auto deg = table.number(key, angle);
@@ -103,8 +126,7 @@ void read_calibration_key(TableReader& table, Camera& camera, const std::filesys
 
 void read_resolution(TableReader& table, Camera& camera) {
     if (!table.has("calibration")) table.require("resolution", "[width, height] in pixels");
-    if (const auto size = table.size("resolution", kMaxPixelsPerSide))
-        camera.width = (*size)[0], camera.height = (*size)[1];
+    if (const auto size = table.size("resolution")) camera.width = (*size)[0], camera.height = (*size)[1];
 }
 
 void check_one_is_given(TableReader& table) {
@@ -117,6 +139,8 @@ void check_one_is_given(TableReader& table) {
 }
 
 }  // namespace
+
+constinit const TableKeys kProjectionKeys{.rows = kProjectionRows};
 
 void read_projection(TableReader& table, Camera& camera, const std::filesystem::path& folder) {
     read_resolution(table, camera);

@@ -11,72 +11,105 @@ namespace narpa {
 
 namespace {
 
-std::int64_t read_period_ns(TableReader& table, std::int64_t otherwise) {
-    const auto rate_hz = table.number("rate_hz", {.low = 1e-3, .high = 10000});
-    return rate_hz ? std::llround(1e9 / *rate_hz) : otherwise;
-}
-
-PixelFormat read_format(TableReader& table, const Camera& camera) {
-    std::array<std::pair<std::string_view, PixelFormat>, kPixelFormatNames.size()> formats;
-    for (std::size_t i = 0; i < formats.size(); ++i)
-        formats[i] = {kPixelFormatNames[i], static_cast<PixelFormat>(i)};
-    const PixelFormat format = table.choice<PixelFormat>("format", formats).value_or(PixelFormat::grey);
-    if (const std::string what = unfit_size(format, camera.width, camera.height); !what.empty())
-        table.fail("format", what);
-    return format;
-}
-
-LatePolicy read_late_policy(TableReader& table) {
-    using enum LatePolicy;
-    static constexpr std::array<std::pair<std::string_view, LatePolicy>, 4> kPolicies{
-        {{"drop", drop}, {"repeat", repeat}, {"late", late}, {"blank", blank}}};
-    return table.choice<LatePolicy>("late_policy", kPolicies).value_or(late);
-}
+constexpr Range kCelsius{.low = -273.15, .high = 200}, kPixelShare{.low = 0, .high = 0.1};
+constexpr TableKey kDetectorRows[]{
+    {"exposure_s", rows::number(kPositive)},
+    {"exposure_stops", rows::number({.low = -20, .high = 20})},
+    {"pixel_pitch_m", rows::number(kPositive)},
+    {"f_number", rows::number(kPositive)},
+    {"quantum_efficiency", rows::number({.low = 0, .high = 1, .low_open = true})},
+    {"full_well_e", rows::number({.low = 1})},
+    {"gain_e_per_dn", rows::number(kNotNegative)},
+    {"read_noise_e", rows::number(kNotNegative)},
+    {"shot_noise", rows::boolean()},
+    {"black_level_dn", rows::integer(0, (1 << 16) - 2)},  // `bits` narrows it
+    {"bits", rows::integer(8, 16)},
+    {"dark_current_e_s", rows::number(kNotNegative)},
+    {"temperature_c", rows::number(kCelsius)},
+    {"dark_reference_c", rows::number(kCelsius)},
+    {"dark_doubling_c", rows::number({.low = 1, .high = 100})},
+    {"prnu", rows::number({.low = 0, .high = 0.5})},
+    {"dsnu_e", rows::number(kNotNegative)},
+    {"dead_pixel_share", rows::number(kPixelShare)},
+    {"hot_pixel_share", rows::number(kPixelShare)},
+    {"hot_pixel_e_s", rows::number(kPositive)},
+    {"blinking_pixel_share", rows::number(kPixelShare)},
+    {"blinking_e_s", rows::number(kPositive)},
+    {"blooming", rows::boolean()},
+    {"cosmic_rays_per_cm2_s", rows::number({.low = 0, .high = 1e6})},
+    {"sensitive_depth_m", rows::number({.low = 0, .high = 0.01, .low_open = true})},
+};
+constexpr TableKey kShutterRows[]{{"kind", rows::kind(), "\"global\" or \"rolling\""}};
+constexpr TableKey kRollingRows[]{
+    {"row_time_s", rows::number(kPositive), "the time from one row's start to the next one's"}};
+constexpr Range kExposure{.low = 1e-9, .high = 100};
+constexpr TableKey kControlRows[]{
+    // At least a millisecond: the bus thread may be that late.
+    {"latency_s", rows::number({.low = 1e-3, .high = 10})},
+    {"trigger", rows::choice<kTriggerModes>()},
+    {"exposure_min_s", rows::number(kExposure)},  // the detector's exposure_s narrows both
+    {"exposure_max_s", rows::number(kExposure)},
+    {"gain_max_db", rows::number({.low = 0, .high = 60})},
+    {"auto_exposure", rows::boolean()},
+    {"auto_exposure_level", rows::number({.low = 0.01, .high = 0.9})},
+};
+constexpr TableKeys kDetectorKeys{.rows = kDetectorRows}, kControlKeys{.rows = kControlRows};
+constexpr TableKeys kShutterKeys{.rows = kShutterRows, .kinds = [] {
+                                     return std::vector<TableKind>{{"global"}, {"rolling", kRollingRows}};
+                                 }};
+constexpr std::array<std::string_view, 4> kLatePolicyNames{"drop", "repeat", "late", "blank"};
+constexpr TableKey kCameraRows[]{
+    {"format", rows::choice<kPixelFormatNames>()},
+    {"rate_hz", rows::number({.low = 1e-3, .high = 10000})},
+    {"embedded_line", rows::boolean()},
+    {"late_policy", rows::choice<kLatePolicyNames>()},
+    {"white_radiance", rows::number(kPositive)},
+    {"detector", rows::table(kDetectorKeys)},
+    {"shutter", rows::table(kShutterKeys)},
+    {"control", rows::table(kControlKeys)},
+};
 
 /// A share of the pixels and the current of each, which belong together.
 void read_defects(TableReader& table, const char* share_key, const char* current_key, double& share,
                   double& current_e_s) {
-    share = table.number(share_key, {.low = 0, .high = 0.1}).value_or(0);
+    table.read(share_key, share);
     if (share > 0) table.require(current_key, "a number > 0, as there is such a share of pixels");
     if (!table.has(share_key)) table.refuse(current_key, fmt::format("there is no {}", share_key));
-    current_e_s = table.number(current_key, kPositive).value_or(0);
+    table.read(current_key, current_e_s);
 }
 
 /// Dark current, and what makes pixels differ from each other.
 void read_sensor_array(TableReader& table, Detector& d) {
-    const Range celsius{.low = -273.15, .high = 200};
-    d.dark_current_e_s = table.number("dark_current_e_s", kNotNegative).value_or(0);
-    d.dark_reference_c = table.number("dark_reference_c", celsius).value_or(d.dark_reference_c);
-    d.temperature_c = table.number("temperature_c", celsius).value_or(d.dark_reference_c);
-    d.dark_doubling_c = table.number("dark_doubling_c", {.low = 1, .high = 100}).value_or(d.dark_doubling_c);
-    d.prnu = table.number("prnu", {.low = 0, .high = 0.5}).value_or(0);
-    d.dsnu_e = table.number("dsnu_e", kNotNegative).value_or(0);
-    d.dead_pixel_share = table.number("dead_pixel_share", {.low = 0, .high = 0.1}).value_or(0);
+    table.read("dark_current_e_s", d.dark_current_e_s);
+    table.read("dark_reference_c", d.dark_reference_c);
+    d.temperature_c = table.number("temperature_c").value_or(d.dark_reference_c);
+    table.read("dark_doubling_c", d.dark_doubling_c);
+    table.read("prnu", d.prnu);
+    table.read("dsnu_e", d.dsnu_e);
+    table.read("dead_pixel_share", d.dead_pixel_share);
     read_defects(table, "hot_pixel_share", "hot_pixel_e_s", d.hot_pixel_share, d.hot_pixel_e_s);
     read_defects(table, "blinking_pixel_share", "blinking_e_s", d.blinking_pixel_share, d.blinking_e_s);
-    d.blooming = table.boolean("blooming").value_or(false);
-    d.cosmic_rays_per_cm2_s = table.number("cosmic_rays_per_cm2_s", {.low = 0, .high = 1e6}).value_or(0);
-    d.sensitive_depth_m =
-        table.number("sensitive_depth_m", {.low = 0, .high = 0.01, .low_open = true}).value_or(d.sensitive_depth_m);
+    table.read("blooming", d.blooming);
+    table.read("cosmic_rays_per_cm2_s", d.cosmic_rays_per_cm2_s);
+    table.read("sensitive_depth_m", d.sensitive_depth_m);
 }
 
 std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_ns) {
     auto table = camera.table("detector");
     if (!table) return std::nullopt;
     Detector d;
-    d.exposure_s = table->number("exposure_s", kPositive).value_or(d.exposure_s);
-    d.pixel_pitch_m = table->number("pixel_pitch_m", kPositive).value_or(d.pixel_pitch_m);
-    d.f_number = table->number("f_number", kPositive).value_or(d.f_number);
-    d.quantum_efficiency =
-        table->number("quantum_efficiency", {.low = 0, .high = 1, .low_open = true}).value_or(d.quantum_efficiency);
-    d.full_well_e = table->number("full_well_e", {.low = 1}).value_or(d.full_well_e);
-    d.gain_e_per_dn = table->number("gain_e_per_dn", kNotNegative).value_or(d.gain_e_per_dn);
-    d.read_noise_e = table->number("read_noise_e", kNotNegative).value_or(d.read_noise_e);
-    d.shot_noise = table->boolean("shot_noise").value_or(d.shot_noise);
-    d.bits = static_cast<int>(table->integer("bits", 8, 16).value_or(d.bits));
+    table->read("exposure_s", d.exposure_s);
+    table->read("pixel_pitch_m", d.pixel_pitch_m);
+    table->read("f_number", d.f_number);
+    table->read("quantum_efficiency", d.quantum_efficiency);
+    table->read("full_well_e", d.full_well_e);
+    table->read("gain_e_per_dn", d.gain_e_per_dn);
+    table->read("read_noise_e", d.read_noise_e);
+    table->read("shot_noise", d.shot_noise);
+    table->read("bits", d.bits);
     d.black_level_dn = static_cast<int>(table->integer("black_level_dn", 0, (1 << d.bits) - 2).value_or(0));
     read_sensor_array(*table, d);
-    d.exposure_s *= std::exp2(table->number("exposure_stops", {.low = -20, .high = 20}).value_or(0));
+    d.exposure_s *= std::exp2(table->number("exposure_stops").value_or(0));
     const double period_s = 1e-9 * static_cast<double>(period_ns);
     if (d.exposure_s > period_s) {
         const std::string what = fmt::format("{} s is longer than a frame, expected at most 1 / rate_hz = {:g} s",
@@ -94,17 +127,11 @@ double rows_s(const Camera& c, const std::optional<Shutter>& shutter) {
 
 /// A shutter needs an exposure time, which the detector states.
 std::optional<Shutter> read_shutter(TableReader& camera, const Camera& c) {
-    enum class Kind : std::uint8_t { global, rolling };
-    static constexpr std::array<std::pair<std::string_view, Kind>, 2> kKinds{
-        {{"global", Kind::global}, {"rolling", Kind::rolling}}};
     auto table = camera.table("shutter");
     if (!table) return std::nullopt;
-    table->require("kind", "\"global\" or \"rolling\"");
-    const Kind kind = table->choice<Kind>("kind", kKinds).value_or(Kind::global);
+    table->kind();
     Shutter shutter;
-    const auto row_time_s = table->number("row_time_s", kPositive);
-    if (kind == Kind::rolling) table->require("row_time_s", "the time from one row's start to the next one's");
-    if (kind == Kind::global) table->refuse("row_time_s", "belongs to kind = \"rolling\"");
+    const auto row_time_s = table->number("row_time_s");
     if (row_time_s) shutter.row_time_ns = std::llround(std::min(*row_time_s, 1e3) * 1e9);
     if (!c.detector) table->fail("kind", "needs an exposure_s, expected a [camera.detector]");
     const double image_s = (c.detector ? c.detector->exposure_s : 0) + rows_s(c, shutter);
@@ -117,10 +144,6 @@ std::optional<Shutter> read_shutter(TableReader& camera, const Camera& c) {
 }
 
 std::optional<CameraControlLimits> read_control(TableReader& camera, const Camera& c) {
-    static constexpr std::array<std::pair<std::string_view, TriggerMode>, 3> kModes{
-        {{kTriggerModes[0], TriggerMode::free_running},
-         {kTriggerModes[1], TriggerMode::command},
-         {kTriggerModes[2], TriggerMode::sync}}};
     auto table = camera.table("control");
     if (!table) return std::nullopt;
     if (!c.detector) {
@@ -129,20 +152,19 @@ std::optional<CameraControlLimits> read_control(TableReader& camera, const Camer
     }
     const double period_s = 1e-9 * static_cast<double>(c.period_ns);
     CameraControlLimits control;
-    const auto ns = [&](std::string_view key, const Range& range, double otherwise_s) {
-        return static_cast<std::int64_t>(std::llround(table->number(key, range).value_or(otherwise_s) * 1e9));
+    const auto ns = [](const std::optional<double>& s, double otherwise_s) {
+        return static_cast<std::int64_t>(std::llround(s.value_or(otherwise_s) * 1e9));
     };
     const double exposure_s = c.detector->exposure_s;
-    // At least a millisecond: the bus thread may be that late.
-    control.latency_ns = ns("latency_s", {.low = 1e-3, .high = 10}, 0.01);
-    control.trigger = table->choice<TriggerMode>("trigger", kModes).value_or(control.trigger);
-    control.exposure_min_ns = ns("exposure_min_s", {.low = 1e-9, .high = exposure_s}, std::min(1e-5, exposure_s));
-    control.exposure_max_ns = ns("exposure_max_s", {.low = exposure_s, .high = 100},
+    control.latency_ns = ns(table->number("latency_s"), 0.01);
+    table->read("trigger", control.trigger);
+    control.exposure_min_ns =
+        ns(table->number("exposure_min_s", {.low = kExposure.low, .high = exposure_s}), std::min(1e-5, exposure_s));
+    control.exposure_max_ns = ns(table->number("exposure_max_s", {.low = exposure_s, .high = kExposure.high}),
                                  std::max(exposure_s, 0.9 * (period_s - rows_s(c, c.shutter))));
-    control.gain_max_cdb =
-        static_cast<std::int16_t>(100 * table->number("gain_max_db", {.low = 0, .high = 60}).value_or(24));
-    control.auto_exposure = table->boolean("auto_exposure").value_or(false);
-    control.level = table->number("auto_exposure_level", {.low = 0.01, .high = 0.9}).value_or(control.level);
+    control.gain_max_cdb = static_cast<std::int16_t>(100 * table->number("gain_max_db").value_or(24));
+    table->read("auto_exposure", control.auto_exposure);
+    table->read("auto_exposure_level", control.level);
     table->finish();
     return control;
 }
@@ -156,17 +178,16 @@ double white_radiance(const Scene& scene) {
 
 /// Refuses keys of the detector in [[camera]], a likely mistake.
 void refuse_keys_of_detector(TableReader& camera) {
-    for (const char* key :
-         {"exposure_s", "exposure_stops", "pixel_pitch_m", "f_number", "quantum_efficiency", "full_well_e",
-          "gain_e_per_dn", "read_noise_e", "shot_noise", "bits", "black_level_dn", "dark_current_e_s"})
-        camera.refuse(key, "belongs to the camera's detector, expected it in [camera.detector]");
+    for (const TableKey& key : kDetectorRows)
+        camera.refuse(key.name, "belongs to the camera's detector, expected it in [camera.detector]");
 }
 
 /// Refuses tables of a camera at the top level.
 void refuse_tables_of_camera(TableReader& root) {
-    for (const char* key :
-         {"detector", "shutter", "control", "intrinsics", "distortion", "lens", "psf", "vignetting", "ghost"})
-        root.refuse(key, fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key));
+    for (const TableKey* key : kCameraKeys.all_rows())
+        if (key->value.type == KeyValue::Type::table)
+            root.refuse(key->name,
+                        fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key->name));
 }
 
 /// Refuses thin lenses with a wide field: rays at right angles to the axis do not meet the plane of focus.
@@ -190,22 +211,24 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.T_mount_camera = mounting.T_mount_sensor;
     read_tracking(table, reading, camera);
     read_projection(table, camera, folder);
-    camera.period_ns = read_period_ns(table, camera.period_ns);
+    if (const auto rate_hz = table.number("rate_hz")) camera.period_ns = std::llround(1e9 / *rate_hz);
     if (scene.render.budget_ns > camera.period_ns)
         table.fail("rate_hz", fmt::format("a period of {} ms, expected at least the budget_ms of [render], {}",
                                           static_cast<double>(camera.period_ns) * 1e-6,
                                           static_cast<double>(scene.render.budget_ns) * 1e-6));
-    camera.format = read_format(table, camera);
-    camera.embedded_line = table.boolean("embedded_line").value_or(camera.embedded_line);
+    table.read("format", camera.format);
+    if (const std::string what = unfit_size(camera.format, camera.width, camera.height); !what.empty())
+        table.fail("format", what);
+    table.read("embedded_line", camera.embedded_line);
     if (camera.embedded_line && camera.height < 2)
         table.fail("embedded_line", "takes the last row, expected a resolution of at least 2 rows");
-    camera.late = read_late_policy(table);
+    table.read("late_policy", camera.late);
     camera.detector = read_detector(table, camera.period_ns);
     camera.shutter = read_shutter(table, camera);
     camera.control = read_control(table, camera);
     read_optics(table, camera, scene.sun.has_value(), folder);
     if (camera.lens) refuse_wide_field(table, camera);
-    camera.white_radiance = table.number("white_radiance", kPositive).value_or(white_radiance(scene));
+    camera.white_radiance = table.number("white_radiance").value_or(white_radiance(scene));
     refuse_keys_of_detector(table);
     if (camera.detector) table.refuse("white_radiance", "belongs to cameras without a [camera.detector]");
     if (!camera.detector && !(camera.white_radiance > 0))
@@ -215,6 +238,9 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
 }
 
 }  // namespace
+
+constinit const TableKeys kCameraKeys{.rows = kCameraRows,
+                                      .parts = {&kMountingKeys, &kTrackingKeys, &kProjectionKeys, &kOpticsKeys}};
 
 void read_sensors(TableReader& root, SceneReading& reading) {
     Scene& scene = reading.scene;

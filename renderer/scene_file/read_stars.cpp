@@ -9,6 +9,15 @@ namespace {
 constexpr double kJ2000 = 2000;
 constexpr Range kYears{.low = 1000, .high = 3000};  // straight proper motion is good to an arcminute here
 constexpr double kFastest_m_s = 2.9e8;              // below the speed of light
+constexpr TableKey kStarRows[]{
+    {"catalogue", rows::file(), "the path of a star catalogue (CSV)"},
+    {"catalogue_epoch", rows::number(kYears)},
+    {"epoch", rows::number(kYears)},
+    {"faintest", rows::number()},
+    {"attitude_wxyz", rows::attitude()},
+    {"rate_rad_s", rows::vec3({.low = -1e3, .high = 1e3})},
+    {"velocity_m_s", rows::vec3()},
+};
 
 /// An error at a line of the catalogue keeps its location; others get that of the scene file.
 Error blamed(Error error, const FilePlace& place, const std::string& scene_file) {
@@ -21,17 +30,19 @@ Error blamed(Error error, const FilePlace& place, const std::string& scene_file)
 
 }  // namespace
 
+constinit const TableKeys kStarsKeys{.rows = kStarRows};
+
 void read_stars(TableReader& root, SceneReading& reading, std::optional<double> epoch_year) {
     auto table = root.table("stars");
     if (!table) return;
-    table->require("catalogue", "the path of a star catalogue (CSV)");
-    const double catalogue_epoch = table->number("catalogue_epoch", kYears).value_or(kJ2000);
-    const double epoch = table->number("epoch", kYears).value_or(epoch_year.value_or(kJ2000));
-    const double faintest = table->number("faintest").value_or(kAnyNumber.high);
+    double catalogue_epoch = kJ2000, epoch = epoch_year.value_or(kJ2000), faintest = kAnyNumber.high;
+    table->read("catalogue_epoch", catalogue_epoch);
+    table->read("epoch", epoch);
+    table->read("faintest", faintest);
     StarField field;
-    field.q_icrs_world = table->attitude("attitude_wxyz").value_or(Quat{});
-    field.rate_rad_s = table->vec3("rate_rad_s", {.low = -1e3, .high = 1e3}).value_or(Vec3{});
-    field.velocity_m_s = table->vec3("velocity_m_s").value_or(Vec3{});
+    table->read("attitude_wxyz", field.q_icrs_world);
+    table->read("rate_rad_s", field.rate_rad_s);
+    table->read("velocity_m_s", field.velocity_m_s);
     if (!(norm(field.velocity_m_s) < kFastest_m_s))
         table->fail("velocity_m_s", "expected a speed below that of light, 2.9e8 m/s at the most");
     if (const auto name = table->text("catalogue")) {

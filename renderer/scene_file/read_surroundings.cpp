@@ -4,7 +4,6 @@
 
 #include "base/constants.h"
 #include "renderer/ephemeris/sun_direction.h"
-#include "renderer/scene_file/kind_names.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -17,8 +16,10 @@ constexpr TableKey kSunRows[]{
     {"angular_diameter_deg", rows::number({.low = 0, .high = 180, .high_open = true})},
     {"direction", rows::direction()},
 };
+constexpr TableKey kAmbientRows[]{
+    {"radiance", rows::rgb({.low = 0, .high = 1e30}), "a number or [r, g, b], W m^-2 sr^-1"}};
 constexpr TableKey kRenderRows[]{
-    {"method", rows::choice<kMethods>()},
+    {"method", rows::choice<RenderSettings::kMethodNames>()},
     {"max_depth", rows::integer(1, 40)},
     {"spp", rows::integer(1, 65535)},
     {"budget_ms", rows::number({.low = 0.001, .high = 1e6})},
@@ -67,8 +68,7 @@ void read_sun(TableReader& root, Scene& scene, bool has_epoch) {
 void read_ambient(TableReader& root, Scene& scene) {
     auto table = root.table("ambient");
     if (!table) return;
-    table->require("radiance", "a number or [r, g, b], W m^-2 sr^-1");
-    scene.ambient = table->rgb("radiance", {.low = 0, .high = 1e30}).value_or(Rgb{});
+    table->read("radiance", scene.ambient);
     table->finish();
 }
 
@@ -89,7 +89,7 @@ void read_render(TableReader& root, Scene& scene) {
     auto table = root.table("render");
     if (!table) return;
     RenderSettings& render = scene.render;
-    render.method = table->choice("method", kMethods).value_or(render.method);
+    table->read("method", render.method);
     if (render.method == RenderSettings::Method::direct)
         table->refuse("max_depth", "belongs to method = \"path\", and this is \"direct\"");
     table->read("max_depth", render.max_depth);
@@ -104,7 +104,7 @@ void read_render(TableReader& root, Scene& scene) {
 }  // namespace
 
 constinit const TableKeys kSceneKeys{.rows = kSceneRows}, kSunKeys{.rows = kSunRows},
-    kRenderKeys{.rows = kRenderRows};
+    kAmbientKeys{.rows = kAmbientRows}, kRenderKeys{.rows = kRenderRows};
 
 void read_surroundings(TableReader& root, SceneReading& reading) {
     const bool has_epoch = reading.has_epoch = read_scene_table(root, reading.scene);

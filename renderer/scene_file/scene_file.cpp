@@ -13,18 +13,12 @@ namespace narpa {
 namespace {
 
 constexpr TableKey kSceneFileRows[]{
-    {"scene", rows::table(kSceneKeys)},
-    {"sun", rows::table(kSunKeys)},
-    {"ambient", rows::table()},
-    {"stars", rows::table()},
-    {"render", rows::table(kRenderKeys)},
-    {"body", rows::tables(), "at least one [[body]]"},
-    {"observer", rows::table(kObserverKeys)},
-    {"light", rows::tables()},
-    {"camera", rows::tables()},
-    {"lidar", rows::tables(kLidarKeys)},
-    {"atmosphere", rows::table()},
-    {"sky", rows::table()},
+    {"scene", rows::table(kSceneKeys)},           {"sun", rows::table(kSunKeys)},
+    {"ambient", rows::table(kAmbientKeys)},       {"stars", rows::table(kStarsKeys)},
+    {"render", rows::table(kRenderKeys)},         {"body", rows::tables(kBodyKeys), "at least one [[body]]"},
+    {"observer", rows::table(kObserverKeys)},     {"light", rows::tables(kLightKeys)},
+    {"camera", rows::tables(kCameraKeys)},        {"lidar", rows::tables(kLidarKeys)},
+    {"atmosphere", rows::table(kAtmosphereKeys)}, {"sky", rows::table(kSkyKeys)},
 };
 
 void read_root(TableReader& root, SceneReading& reading) {

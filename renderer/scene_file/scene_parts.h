@@ -55,9 +55,12 @@ struct SceneReading {
     std::optional<Observing> observer{};
 };
 
-extern const TableKeys kSceneKeys, kSunKeys, kRenderKeys, kObserverKeys, kLidarKeys;
-extern const TableKeys kOrbitKeys;     ///< of `orbit` of a body
-extern const TableKeys kTrackingKeys;  ///< of cameras at the observer: a part of their keys
+extern const TableKeys kSceneKeys, kSunKeys, kAmbientKeys, kStarsKeys, kRenderKeys, kBodyKeys, kObserverKeys,
+    kLightKeys, kCameraKeys, kLidarKeys, kAtmosphereKeys, kSkyKeys;
+extern const TableKeys kMaterialKeys, kDemKeys;  ///< of `material` and `dem` of a body
+extern const TableKeys kOrbitKeys;               ///< of `orbit` of a body
+/// Parts of the keys of cameras: those at the observer, size and projection, optics.
+extern const TableKeys kTrackingKeys, kProjectionKeys, kOpticsKeys;
 /// [scene], [sun], [ambient], [render].
 void read_surroundings(TableReader& root, SceneReading& reading);
 /// [stars], with its catalogue. `epoch_year`: that of [scene], if it has one.

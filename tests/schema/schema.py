@@ -73,14 +73,15 @@ FREE = {"scene/lidar/model", "scene/lidar/rate_hz", "scene/lidar/range_min_m", "
         "scene/lidar/returns", "scene/lidar/sub_rays", "scene/lidar/columns", "scene/render/seed",
         "lidar/lidar/rate_hz_min", "lidar/lidar/rate_hz_max", "lidar/lidar/range_resolution_m",
         "lidar/lidar/velocity_resolution_m_s", "lidar/lidar/name", "lidar/grid/fov_horizontal_deg",
-        "lidar/grid/fov_vertical_deg", "scene/observer/height_m"}
+        "lidar/grid/fov_vertical_deg", "scene/body/can_id", "scene/camera/format",
+        "scene/camera.detector/black_level_dn"}
 # Keys of sections that share a table, described by a table of their own.
 SHARED = {"name", "mount", "position_m", "attitude_wxyz", "look_at", "up"}
 
 
 def interval(text):
     """(low, low is open, high, high is open) of "0 to < 180", "> 0", "+-5", "(0, 1]"; None: it is none."""
-    text = text.strip()
+    text = text.strip().removesuffix(", or inf")
     if m := re.fullmatch(rf"(>=?)\s*({NUMBER})(?: to (<?)\s*({NUMBER}))?", text):
         return float(m[2]), m[1] == ">", float(m[4]) if m[4] else math.inf, m[3] == "<"
     if m := re.fullmatch(rf"({NUMBER}) to (<?)\s*({NUMBER})", text):
@@ -113,21 +114,29 @@ def agree(documented, own):
     return documented[:2] == own[:2] and (no_limit or documented[2:] == own[2:])
 
 
-def documented_rows(file):
-    """(section, keys, cells by heading) of each row of a key table."""
-    section, heads, rows = "", [], []
+def documented_rows(file, home=""):
+    """(table, kinds, keys, cells by heading) of each row of a key table; `home`: the table of sections that name none."""
+    section, table, heads, kinds, rows = home, home, [], [], []
     for line in file.read_text().splitlines():
-        if m := re.match(r"## \[+([\w.]+)\]", line):
-            section = m[1]
-        elif line.startswith("## "):
-            section = ""
+        if line.startswith("## "):
+            m = re.match(r"## \[+([\w.]+)\]", line)
+            section = table = m[1] if m else home
+        elif m := re.match(r"(?:### |`)(\w+) = \{", line):
+            table = f"{section}.{m[1]}"
         cells = [c.strip() for c in line.strip("|").split("|")]
         if not line.startswith("|"):
-            heads = []
-        elif not heads:
+            heads, kinds = [], []
+            continue
+        if not heads:
             heads = cells
-        elif section and heads[0] == "key" and (keys := re.findall(r"`(\w+)`", cells[0])):
-            rows.append((section, keys, dict(zip(heads, cells))))
+            continue
+        column = {"key": 0, "key of `dem`": 0, "keys of all kinds": 0, "`kind`": 1}.get(heads[0])
+        if not section or column is None or heads[column].startswith("`"):
+            continue
+        if column == 1:
+            kinds = re.findall(r'"(\w+)"', cells[0]) or kinds
+        if keys := re.findall(r"`(\w+)`", cells[column]):
+            rows.append((table, kinds, keys, dict(zip(heads, cells))))
     return rows
 
 
@@ -144,6 +153,27 @@ def rehearsal_rows(file):
     return rows
 
 
+def table_at(kind, path):
+    """The schema of a table, "camera.detector"; None: it has no rows."""
+    table = SCHEMAS[kind]
+    for name in path.split("."):
+        value = table["properties"].get(name, {})
+        table = next((t for t in [value, value.get("items", {}), *value.get("anyOf", [])] if "properties" in t), None)
+        if table is None:
+            return None
+    return table
+
+
+def values_of(table, key, kinds):
+    """The schemas of a key, in tables of these kinds; no kinds: of all that have it."""
+    if (value := table["properties"].get(key, False)) is not True:
+        return [value] if value else []
+    own = {next(iter(rule["if"]["properties"].values()))["const"]: rule["then"]["properties"][key] for rule in table["allOf"]}
+    if kinds:
+        return [own[kind] for kind in kinds] if all(own[kind] for kind in kinds) else []
+    return [value for value in own.values() if value]
+
+
 class Output(unittest.TestCase):
     def test_json_is_one_document(self):
         said = subprocess.run([NARPA, "check", "--schema", "scene", "--json"], capture_output=True, text=True, check=True)
@@ -151,35 +181,39 @@ class Output(unittest.TestCase):
 
 
 class Documents(unittest.TestCase):
-    def compare(self, kind, file):
+    def compare_row(self, values, keys, i, cells):
+        ranges = re.split(r",(?![^(\[]*[)\]])", cells["range"])
+        text = (ranges[i] if len(ranges) == len(keys) else cells["range"]).split(";")[0]
+        for value in values:
+            if choices := choices_of(value):
+                self.assertEqual(sorted(choices), sorted(re.findall(r'"([^"]+)"', cells["range"])))
+            elif value.get("type") != "boolean":
+                own = interval_of(value)
+                self.assertTrue(agree(interval(text), own), f"the document says {text!r}, the row {own}")
+
+    def compare(self, kind, file, home=""):
         documented = {}
-        for section, keys, cells in documented_rows(SOURCE / "docs" / file):
-            table = SCHEMAS[kind]["properties"].get(section)
-            self.assertIsNotNone(table, f"[{section}] of {file} has no rows")
-            table = table.get("items", table)
-            if "properties" not in table:
-                continue
-            ranges = re.split(r",(?![^(\[]*[)\]])", cells.get("range", ""))
+        for path, kinds, keys, cells in documented_rows(SOURCE / "docs" / file, home):
+            table = table_at(kind, path)
+            self.assertIsNotNone(table, f"[{path}] of {file} has no rows")
+            documented.setdefault(path, set()).update(keys, ["kind"] if kinds else [])
             for i, key in enumerate(keys):
-                documented.setdefault(section, set()).add(key)
-                value = table["properties"].get(key)
-                with self.subTest(file=file, table=section, key=key):
-                    self.assertIsNotNone(value, "the document has a key without a row")
-                    if f"{kind}/{section}/{key}" in FREE or "range" not in cells:
-                        continue
-                    if choices := choices_of(value):
-                        self.assertEqual(sorted(choices), sorted(re.findall(r'"([^"]+)"', cells["range"])))
-                    elif value.get("type") != "boolean":
-                        text = ranges[i] if len(ranges) == len(keys) else cells["range"].split(";")[0]
-                        own = interval_of(value)
-                        self.assertTrue(agree(interval(text), own), f"the document says {text!r}, the row {own}")
-        for section, keys in documented.items():
-            table = SCHEMAS[kind]["properties"][section]
-            rows = set(table.get("items", table)["properties"]) - keys
-            self.assertFalse(rows - SHARED, f"[{section}]: rows that {file} lacks")
+                with self.subTest(file=file, table=path, kinds=kinds, key=key):
+                    values = values_of(table, key, kinds)
+                    self.assertTrue(values, "the document has a key without a row")
+                    if f"{kind}/{path}/{key}" not in FREE and key not in SHARED and not cells.get("range", "as").startswith("as"):
+                        self.compare_row(values, keys, i, cells)
+        for path, keys in documented.items():
+            rows = set(table_at(kind, path)["properties"]) - keys
+            self.assertFalse(rows - SHARED, f"[{path}]: rows that {file} lacks")
+        return documented
 
     def test_scene(self):
-        self.compare("scene", "scene.md")
+        documented = self.compare("scene", "scene.md")
+        self.assertLessEqual({"camera.detector", "camera.psf", "body.material", "light", "stars", "sky"}, set(documented))
+
+    def test_terrain(self):
+        self.assertEqual(set(self.compare("scene", "terrain.md", "body.dem")), {"body.dem", "body.dem.detail"})
 
     def test_lidar(self):
         self.compare("lidar", "lidar-description.md")
@@ -272,6 +306,113 @@ sun = true
 name = "ball"
 position_m = [0.0, 30.0, 0.0]
 sphere = {radius_m = 1.0}
+can_id = 16
+[body.material]
+kind = "phong"
+specular = 0.2
+exponent = 9
+emission = [0.1, 0.2, 0.3]
+retroreflectance = 2
+[[body]]
+name = "egg"
+velocity_m_s = [1.0, 0.0, 0.0]
+rate_rad_s = [0.1, 0.0, 0.0]
+[body.ellipsoid]
+semi_axes_m = [1.0, 2.0, 3.0]
+[body.material]
+kind = "ggx"
+metallic = 1
+roughness = 0.2
+ior = 2.5
+fresnel = "exact"
+[[body]]
+name = "comet"
+material = {kind = "hapke", albedo = 0.05, b = 0.3, c = 0.2, opposition_b0 = 1, opposition_h = 0.06, roughness_deg = 20}
+rotation = "eros"
+[body.sphere]
+radius_m = 500
+[[body]]
+name = "satellite"
+sphere = {radius_m = 3.0}
+[body.orbit]
+semi_major_axis_m = 7e6
+eccentricity = 0.01
+mean_anomaly_deg = 20
+[[body]]
+name = "planet"
+sphere = {radius_m = 6371000}
+position_m = [0.0, 0.0, -1e7]
+[atmosphere]
+body = "planet"
+planet = "earth"
+turbidity = 2
+ozone_du = 250
+steps = 8
+samples_per_band = 1
+[stars]
+catalogue = "CATALOGUE"
+epoch = 2026.2
+faintest = 2
+rate_rad_s = [0.0, 0.0, 0.001]
+[[light]]
+name = "lamp"
+kind = "point"
+intensity_w_sr = 5
+position_m = [1.0, 2.0, 3.0]
+[[light]]
+name = "panel"
+kind = "rectangle"
+radiance_w_m2_sr = [1.0, 2.0, 3.0]
+size_m = [1.0, 0.5]
+look_at = [0.0, 30.0, 0.0]
+[[light]]
+name = "spot"
+kind = "disc"
+radiance_w_m2_sr = 7
+radius_m = 0.1
+[[camera]]
+name = "c"
+look_at = [0.0, 30.0, 1.0]
+resolution = [128, 96]
+fov_horizontal_deg = 20
+format = "Y16"
+rate_hz = 5
+embedded_line = true
+late_policy = "drop"
+veiling_glare = 0.01
+distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0]}
+[camera.detector]
+exposure_s = 0.001
+bits = 10
+quantum_efficiency = 0.6
+shot_noise = true
+black_level_dn = 16
+prnu = 0.01
+temperature_c = -10
+[camera.shutter]
+kind = "rolling"
+row_time_s = 1e-5
+[camera.control]
+latency_s = 0.005
+trigger = "command"
+gain_max_db = 18
+[camera.lens]
+aperture_diameter_m = 0.01
+focus_distance_m = 20
+[camera.psf]
+sigma_px = 0.8
+[camera.vignetting]
+polynomial = [-0.05, 0.01]
+[camera.ghost]
+strength = 1e-4
+radius_px = 9
+within_deg = 25
+[[camera]]
+name = "wide"
+resolution = [48, 64]
+projection = {kind = "double_sphere", xi = -0.2, alpha = 0.6}
+intrinsics = {fx = 30, fy = 30}
+white_radiance = 100
 [[lidar]]
 name = "l"
 model = "VLP-16"
@@ -286,6 +427,30 @@ sub_rays = 8
 multipath = "none"
 range_at_10_percent_m = 50
 range_noise_m = 0.01
+""".replace("CATALOGUE", str(SOURCE.resolve() / "scenes/stars/brightest.csv"))
+
+SKY = """
+[sun]
+direction = [0.0, 0.0, 1.0]
+[sky]
+model = "hosek-wilkie"
+turbidity = 2
+ground_albedo = 0.2
+up = [0.0, 0.0, 1.0]
+[[body]]
+name = "ground"
+[body.dem]
+file = "none.tif"
+on = "tangent"
+has = "heights"
+error_px = 1
+seen_from_m = [[0.0, 0.0, 100.0]]
+budget_mib = 100
+detail = {posts = 4, craters_per_m2 = 0.08}
+[[camera]]
+name = "c"
+resolution = [64, 48]
+fov_diagonal_deg = 20
 """
 
 # (line of GOOD, what replaces it)
@@ -316,6 +481,59 @@ BROKEN = [
     ("sub_rays = 8", "sub_rays = 8.5"), ('multipath = "none"', 'multipath = "some"'),
     ("range_at_10_percent_m = 50", "range_at_10_percent_m = 0"), ("range_noise_m = 0.01", "range_noise_m = -0.01"),
     ("range_noise_m = 0.01", "range_noise_m = [0.01]"), ("[sun]", "[suns]"), ("[render]", "[renderer]"),
+    # bodies and materials
+    ("can_id = 16", "can_id = 1536"), ("can_id = 16", "can_id = 0.5"), ("sphere = {radius_m = 1.0}", "sphere = {radius_m = 0}"),
+    ("sphere = {radius_m = 1.0}", "sphere = {}"), ("sphere = {radius_m = 1.0}", "sphere = 1.0"),
+    ("position_m = [0.0, 30.0, 0.0]", "position_m = 30.0"), ('name = "egg"', ""), ('name = "egg"', "name = 3"),
+    ("velocity_m_s = [1.0, 0.0, 0.0]", "velocity_m_s = [1.0]"), ("rate_rad_s = [0.1, 0.0, 0.0]", "rate_deg_s = [0.1, 0.0, 0.0]"),
+    ("semi_axes_m = [1.0, 2.0, 3.0]", "semi_axes_m = [1.0, 2.0]"), ("semi_axes_m = [1.0, 2.0, 3.0]", ""),
+    ("semi_axes_m = [1.0, 2.0, 3.0]", "semi_axes_m = [1.0, 2.0, -3.0]"), ('rotation = "eros"', 'rotation = "vulcan"'),
+    ("semi_major_axis_m = 7e6", "semi_major_axis_m = 6e6"), ("semi_major_axis_m = 7e6", ""), ("eccentricity = 0.01", "eccentricity = 1"),
+    ('kind = "phong"', 'kind = "lambert"'), ('kind = "phong"', 'kind = "blinn"'), ("specular = 0.2", ""), ("specular = 0.2", "specular = 1.2"),
+    ("specular = 0.2", "specular = [0.2, 0.2]"), ("exponent = 9", ""), ("exponent = 9", "shininess = 9"),
+    ("emission = [0.1, 0.2, 0.3]", "emission = -1"), ("emission = [0.1, 0.2, 0.3]", 'emission = "red"'),
+    ("retroreflectance = 2", "retroreflectance = 1e7"), ("metallic = 1", "metallic = 2"), ("metallic = 1", "asymmetry = 0.1"),
+    ("ior = 2.5", "ior = 5"), ('kind = "ggx"', 'kind = "dielectric"'), ('fresnel = "exact"', 'fresnel = "none"'),
+    ('fresnel = "exact"', "texture = {wrap = 'clamp'}"), ('fresnel = "exact"', "texture = 3"),
+    ('fresnel = "exact"', "normal_texture = {file = 'a.png', colour = 'srgb'}"),
+    # lights, air and stars
+    ("intensity_w_sr = 5", ""), ("intensity_w_sr = 5", "intensity_w_sr = -5"), ("intensity_w_sr = 5", "radiance_w_m2_sr = 5"),
+    ('kind = "point"', 'kind = "directional"'), ('kind = "point"', ""), ("position_m = [1.0, 2.0, 3.0]", "look_at = [1.0, 2.0, 3.0]"),
+    ("radiance_w_m2_sr = [1.0, 2.0, 3.0]", "radiance_w_m2_sr = [1.0, 2.0]"), ("size_m = [1.0, 0.5]", ""), ("size_m = [1.0, 0.5]", "size_m = [1.0, 0]"),
+    ("look_at = [0.0, 30.0, 0.0]", "look_at = 30.0"), ('kind = "disc"', 'kind = "rectangle"'), ("radius_m = 0.1", "radius_m = 1e13"),
+    ('body = "planet"', ""), ('planet = "earth"', 'planet = "venus"'), ("turbidity = 2", "turbidity = 0.5"), ("ozone_du = 250", "ozone_du = -1"),
+    ("steps = 8", "steps = 3"), ("samples_per_band = 1", "samples_per_band = 9"), ("epoch = 2026.2", "epoch = 20262"),
+    ("faintest = 2", "faintest = true"), ("rate_rad_s = [0.0, 0.0, 0.001]", "rate_rad_s = [0.0, 0.0, 1001]"),
+    # cameras
+    ('name = "c"', ""), ("look_at = [0.0, 30.0, 1.0]", "lookat = [0.0, 30.0, 1.0]"), ("resolution = [128, 96]", "resolution = [64, 0]"),
+    ("resolution = [128, 96]", "resolution = [64, 16385]"), ("fov_horizontal_deg = 20", "fov_horizontal_deg = 360"),
+    ("fov_horizontal_deg = 20", "fov_deg = 20"), ('format = "Y16"', 'format = "Y12"'), ("rate_hz = 5", "rate_hz = 1e5"),
+    ("embedded_line = true", "embedded_line = 1"), ('late_policy = "drop"', 'late_policy = "wait"'), ("veiling_glare = 0.01", "veiling_glare = 1"),
+    ('distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0]}', 'distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0, 0.0]}'),
+    ('distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0]}', 'distortion = {model = "fov", coefficients = [0.0, 0.0, 0.0, 0.0]}'),
+    ('distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0]}', 'distortion = {coefficients = [0.0, 0.0, 0.0, 0.0]}'),
+    ("exposure_s = 0.001", "exposure_s = 0"), ("exposure_s = 0.001", "exposure = 0.001"), ("bits = 10", "bits = 17"), ("bits = 10", "bits = 10.5"),
+    ("quantum_efficiency = 0.6", "quantum_efficiency = 60"), ("shot_noise = true", "shot_noise = 1"), ("black_level_dn = 16", "black_level_dn = -1"),
+    ("prnu = 0.01", "prnu = 1"), ("temperature_c = -10", "temperature_c = -300"), ("row_time_s = 1e-5", ""), ("row_time_s = 1e-5", "row_time_s = 0"),
+    ('kind = "rolling"', 'kind = "global"'), ('kind = "rolling"', ""), ("latency_s = 0.005", "latency_s = 0"), ('trigger = "command"', 'trigger = "edge"'),
+    ("gain_max_db = 18", "gain_max_db = 61"), ("focus_distance_m = 20", ""), ("focus_distance_m = 20", "focus_distance_m = -1"),
+    ("aperture_diameter_m = 0.01", "aperture_diameter_m = 0"), ("sigma_px = 0.8", "sigma_px = 9"), ("polynomial = [-0.05, 0.01]", "polynomial = []"),
+    ("polynomial = [-0.05, 0.01]", "polynomial = [1, 2, 3, 4]"), ("strength = 1e-4", "strength = 2"), ("radius_px = 9", ""), ("within_deg = 25", "within_deg = 90"),
+    ('projection = {kind = "double_sphere", xi = -0.2, alpha = 0.6}', 'projection = {kind = "double_sphere", xi = -1, alpha = 0.6}'),
+    ('projection = {kind = "double_sphere", xi = -0.2, alpha = 0.6}', 'projection = {kind = "double_sphere", xi = -0.2}'),
+    ('projection = {kind = "double_sphere", xi = -0.2, alpha = 0.6}', 'projection = {kind = "pinhole", xi = -0.2, alpha = 0.6}'),
+    ("intrinsics = {fx = 30, fy = 30}", "intrinsics = {fx = 30}"), ("intrinsics = {fx = 30, fy = 30}", "intrinsics = {fx = 30, fy = 0}"),
+    ("white_radiance = 100", "white_radiance = 0"),
+]
+
+# The same of SKY; its DEM is missing.
+BROKEN_SKY = [
+    ('model = "hosek-wilkie"', ""), ('model = "hosek-wilkie"', 'model = "preetham"'), ("turbidity = 2", "turbidity = 11"),
+    ("ground_albedo = 0.2", "ground_albedo = 2"), ("up = [0.0, 0.0, 1.0]", "up = 1"), ('file = "none.tif"', ""), ('on = "tangent"', 'on = "sea"'),
+    ('has = "heights"', 'has = "depths"'), ("error_px = 1", "error_px = 0"), ("seen_from_m = [[0.0, 0.0, 100.0]]", "seen_from_m = [[0.0, 0.0]]"),
+    ("seen_from_m = [[0.0, 0.0, 100.0]]", "seen_from_m = []"), ("budget_mib = 100", "budget_mib = 0"),
+    ("detail = {posts = 4, craters_per_m2 = 0.08}", "detail = {craters_per_m2 = 0.08}"),
+    ("detail = {posts = 4, craters_per_m2 = 0.08}", "detail = {posts = 1}"),
 ]
 
 
@@ -428,23 +646,36 @@ class Broken(unittest.TestCase):
             self.assertIn(said.returncode, (0, 2), said.stderr)
             return said.returncode == 0, said.stderr
 
-    def compare(self, kind, good, broken):
+    def refused(self, kind, good, line, wrong):
+        """What narpa says of a file in which this line is wrong."""
+        with self.subTest(line=line, wrong=wrong):
+            self.assertEqual(good.count(f"\n{line}\n"), 1)
+            text = good.replace(f"\n{line}\n", f"\n{wrong}\n")
+            self.assertNotEqual(errors(kind, tomllib.loads(text)), [])
+            accepted, said = self.accepted_by_narpa(text)
+            self.assertFalse(accepted)
+            return said
+        return ""
+
+    def compare(self, kind, good, broken, least):
         self.assertEqual(errors(kind, tomllib.loads(good)), [])
         accepted, why = self.accepted_by_narpa(good)
         self.assertTrue(accepted, why)
-        self.assertGreaterEqual(len(broken), 50)
+        self.assertGreaterEqual(len(broken), least)
         for line, wrong in broken:
-            with self.subTest(line=line, wrong=wrong):
-                self.assertEqual(good.count(f"\n{line}\n"), 1)
-                text = good.replace(f"\n{line}\n", f"\n{wrong}\n")
-                self.assertNotEqual(errors(kind, tomllib.loads(text)), [])
-                self.assertFalse(self.accepted_by_narpa(text)[0])
+            self.refused(kind, good, line, wrong)
 
     def test_each_broken_scene_is_refused_by_both(self):
-        self.compare("scene", GOOD, BROKEN)
+        self.compare("scene", GOOD, BROKEN, 150)
 
     def test_each_broken_scenario_is_refused_by_both(self):
-        self.compare("scenario", GOOD_SCENARIO, BROKEN_SCENARIOS)
+        self.compare("scenario", GOOD_SCENARIO, BROKEN_SCENARIOS, 50)
+
+    def test_each_broken_sky_and_terrain_is_refused_by_both(self):
+        self.assertEqual(errors("scene", tomllib.loads(SKY)), [])
+        self.assertIn("none.tif: no such file", self.accepted_by_narpa(SKY)[1])
+        for line, wrong in BROKEN_SKY:
+            self.assertNotIn("none.tif", self.refused("scene", SKY, line, wrong))
 
 
 unittest.main(argv=sys.argv[:1])

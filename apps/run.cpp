@@ -30,6 +30,7 @@ struct RunCommandOptions {
     std::string estimate_camera;  ///< empty: the first
     TrackerFlags estimator;
     RunOptions run;
+    std::optional<double> late_max_percent;
     int ready_fd = -1;
 };
 
@@ -58,13 +59,18 @@ Step step_of(const Emulator& emulator) {
         const std::string bodies = emulator.bodies_without_a_pose();
         return {-1, bodies.empty() ? "waiting for commands" : "waiting for the first pose of " + bodies};
     }
-    if (o.duration_s == 0) return {-1, fmt::format("t = {:.1f} s", t_s)};
-    return {t_s / o.duration_s, fmt::format("t = {:.1f} s of {:g} s", t_s, o.duration_s)};
+    std::string text = fmt::format("t = {:.1f} s", t_s);
+    if (o.duration_s > 0) text += fmt::format(" of {:g} s", o.duration_s);
+    if (!o.lockstep)
+        for (const auto& sensor : emulator.sensors())
+            if (const std::string how = sensor->progress(); !how.empty()) text += "; " + how;
+    return {o.duration_s > 0 ? t_s / o.duration_s : -1, text};
 }
 
 Outcome run(const RunCommandOptions& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
     RunOptions o = options.run;
+    if (options.late_max_percent) o.late_max = *options.late_max_percent / 100;
     auto video = options.devices.video(), lidar = options.devices.lidar();
     if (!video) return video.error();
     if (!lidar) return lidar.error();
@@ -150,6 +156,10 @@ Command add_run(Parser app) {
                              "--estimate-seed", "--estimate-uncertainty", "--estimate-frame-noise"})
         c.find(name).needs(estimate);
     o->budget.add_to(c);
+    c.option("--late-max", o->late_max_percent,
+             "Fail if more than this percentage of a camera's frames were late or skipped")
+        .range(0.0, 100.0)
+        .excludes(lockstep);
     c.option("--cpus", o->cpus, "Processors for the threads that trace rays, as 0,1 or 2-3; each is bound to one")
         .type_name("LIST")
         .excludes(lockstep);

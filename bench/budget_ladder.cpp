@@ -77,7 +77,7 @@ void measure(View& v, Candidate& c, const ReferenceLoop& loop, std::uint32_t num
         v.threads.arena.execute([&] { expose(v.camera, v.image, c.settings.seed, number, v.bytes); });
         v.detector_s.push_back(seconds_since(detector_start_ns));
     }
-    c.rung.step = std::max(c.rung.step, account.step);
+    if (is_worse(account.step, c.rung.step)) c.rung.step = account.step;
     c.rung.rays += static_cast<double>(account.rays) / frames;
     c.rung.samples += static_cast<double>(account.samples) / frames;
     for (std::size_t k = 0; k < kPhases; ++k) c.rung.phase_ns[k] += account.phase_ns[k] / frames;

@@ -64,8 +64,8 @@ struct Rung : ErrorRow {
 
     [[nodiscard]] double median_s() const;
     [[nodiscard]] double median_cpu_s() const;
-    /// Frames that leave out indirect light or pixels cannot estimate their error.
-    [[nodiscard]] bool estimates_error() const { return step <= FrameStep::one_sample; }
+    /// Frames that leave out indirect light cannot estimate their error.
+    [[nodiscard]] bool estimates_error() const { return is_worse(FrameStep::no_indirect, step); }
     [[nodiscard]] double predicted_to_measured() const { return predicted.value_or(0) / rmse.value; }
 };
 

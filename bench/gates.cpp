@@ -165,10 +165,12 @@ std::optional<std::string> prediction_fault(const Rung& rung) {
     if (!rung.predicted)
         return rung.estimates_error() ? std::optional<std::string>("its frames have no error estimate")
                                       : std::nullopt;
-    if (rung.predicted_to_measured() >= kPredictedLeast && rung.predicted_to_measured() <= kPredictedMost)
-        return {};
+    const bool filled = is_filled(rung.step);
+    const double least = filled ? kFilledPredictedLeast : kPredictedLeast;
+    const double most = filled ? kFilledPredictedMost : kPredictedMost;
+    if (rung.predicted_to_measured() >= least && rung.predicted_to_measured() <= most) return {};
     return fmt::format("the predicted error is {:.2f} of the measured, expected {} to {}",
-                       rung.predicted_to_measured(), kPredictedLeast, kPredictedMost);
+                       rung.predicted_to_measured(), least, most);
 }
 
 std::optional<std::string> speed_fault(const SceneLadder& scene) {

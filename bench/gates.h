@@ -55,6 +55,8 @@ struct SceneLadder {
 /// error.
 inline constexpr double kToRawMost = 1.6, kEdgeMost = 0.032, kMovedMost_s = 1e-3, kLoadMost_s = 0.3;
 inline constexpr double kPredictedLeast = 0.85, kPredictedMost = 1.40;
+/// The same of frames with less than one sample per pixel.
+inline constexpr double kFilledPredictedLeast = 0.7, kFilledPredictedMost = 1.5;
 
 /// Bounds that are missed, one sentence each. A rung without a predicted error is one of them, unless its frames
 /// left out pixels or indirect light.

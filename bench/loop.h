@@ -37,7 +37,9 @@ struct CameraRun {
     nlohmann::json report{};  ///< CameraSensor::report
 
     /// Frames without a whole image; there must be none.
-    [[nodiscard]] std::uint64_t incomplete() const noexcept { return stats.steps.back(); }
+    [[nodiscard]] std::uint64_t incomplete() const noexcept {
+        return stats.steps[static_cast<std::size_t>(FrameStep::nothing)];
+    }
     /// Fraction of the frames due that were handed over late, or skipped because the one before was late.
     [[nodiscard]] double late_fraction() const noexcept;
     /// Quantile p of the time of a frame over its allowance; above 1: late.

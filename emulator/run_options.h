@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,8 +18,9 @@ struct RunOptions {
     double duration_s = 0;   ///< of simulation time; 0: until stopped or until a recorded bus ends
     std::string log_folder;  ///< empty: no log
     bool log_shots = false;  ///< logs the truth of every LiDAR shot too, at the cost of a second ray for each
-    int threads = 0;         ///< tracing threads; 0: one per core, or one per entry of `cpus`
-    std::vector<int> cpus;   ///< processors that tracing threads are bound to in real time; empty: any
+    std::optional<double> late_max{};  ///< part of a camera's frames that may be late or skipped; empty: any
+    int threads = 0;                   ///< tracing threads; 0: one per core, or one per entry of `cpus`
+    std::vector<int> cpus;             ///< processors that tracing threads are bound to in real time; empty: any
     std::vector<OpenFrameObserver> observers{};            ///< of names that differ; several may share a camera
     std::function<void(const std::string&)> on_refusal{};  ///< in lockstep, once, when CanNode::refuses_poses
 };

@@ -68,6 +68,10 @@ public:
     /// Items that sinks have dropped so far. From any thread.
     [[nodiscard]] virtual std::uint64_t drops() const noexcept { return 0; }
 
+    /// How it keeps up, for the line of progress: "nav: 3 late, 0 skipped"; empty: nothing to tell. From any
+    /// thread.
+    [[nodiscard]] virtual std::string progress() const { return {}; }
+
     /// Items made. After the run.
     [[nodiscard]] virtual std::uint64_t made() const noexcept = 0;
     /// Why the run has failed, and how it would keep up: a sentence each; empty: it has not, it does.

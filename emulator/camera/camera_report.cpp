@@ -106,7 +106,18 @@ std::string CameraSensor::to_text(bool lockstep) const {
     return out;
 }
 
+std::string CameraSensor::progress() const {
+    const float error = shown_.expected_error;
+    return fmt::format("{}: {} late, {} skipped, {:.2f} samples/pixel{}", name(), shown_.late.load(),
+                       shown_.skipped.load(), shown_.samples_per_pixel.load(),
+                       error < 0 ? "" : fmt::format(", error {:.2g}", error));
+}
+
 std::string CameraSensor::failure() const {
+    const std::uint64_t due = stats_.frames + stats_.skipped, missed = stats_.skipped + stats_.deadline_missed;
+    if (late_max_ && share(missed, due) > *late_max_)
+        return fmt::format("camera {}: {} of {} frames were late or skipped, expected at most {:g} %", name(),
+                           missed, due, 100 * *late_max_);
     if (share(stats_.skipped, stats_.frames + stats_.skipped) <= kSkippedShareMax) return {};
     return fmt::format("a camera skipped more than {:g} % of its frames", 100 * kSkippedShareMax);
 }

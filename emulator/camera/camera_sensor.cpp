@@ -40,15 +40,16 @@ Status open_cameras(const World& world, const RunOptions& o, OpenSensors& out) {
         });
         if (!sinks) return sinks.error();
         if (sinks->empty()) continue;
-        auto camera = std::make_unique<CameraSensor>(world, i, *std::move(sinks));
+        auto camera = std::make_unique<CameraSensor>(world, i, *std::move(sinks), o.late_max);
         out.cameras.push_back(camera.get());
         out.all.push_back(std::move(camera));
     }
     return Ok{};
 }
 
-CameraSensor::CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks)
-    : world_(world), index_(camera), unit_(world, camera), sinks_(std::move(sinks)) {
+CameraSensor::CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks,
+                           std::optional<double> late_max)
+    : world_(world), index_(camera), unit_(world, camera), sinks_(std::move(sinks)), late_max_(late_max) {
     const LatePolicy late = unit_.camera().late;
     if (late == LatePolicy::repeat || late == LatePolicy::blank) spare_.resize(unit_.bytes().size());
     fill_black(unit_.camera().format, spare_);
@@ -167,6 +168,9 @@ bool CameraSensor::send(std::span<const std::uint8_t> bytes, const FrameStamp& s
 void CameraSensor::account(const FrameLedger& ledger) noexcept {
     ++stats_.frames;
     stats_.deadline_missed += !ledger.deadline_met;
+    shown_.late.store(stats_.deadline_missed, std::memory_order_relaxed);
+    shown_.samples_per_pixel.store(ledger.samples_per_pixel, std::memory_order_relaxed);
+    shown_.expected_error.store(ledger.expected_error, std::memory_order_relaxed);
     stats_.stale += ledger.pose_stale;
     stats_.repeated += ledger.delivery == Delivery::repeated;
     stats_.blanked += ledger.delivery == Delivery::blank;
@@ -188,6 +192,7 @@ void CameraSensor::skip_missed(const Clock& clock) noexcept {
                due_ns() + unit_.settings().period_ns <= clock.now_ns();
     };
     for (; missed(); advance(std::nullopt)) ++stats_.skipped;
+    shown_.skipped.store(stats_.skipped, std::memory_order_relaxed);
 }
 
 /// Passes on settings from the readers of sinks as camera commands; the replies go to the CAN bus.

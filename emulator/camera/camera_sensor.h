@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -39,7 +40,9 @@ struct CameraStats {
 
 class CameraSensor final : public Sensor {
 public:
-    CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks);
+    /// `late_max`: RunOptions::late_max.
+    CameraSensor(const World& world, std::size_t camera, std::vector<std::unique_ptr<VideoSink>> sinks,
+                 std::optional<double> late_max = {});
 
     /// Keeps each frame's ledger for send_telemetry.
     void keep_ledgers() noexcept { keeps_ledgers_ = true; }
@@ -74,6 +77,7 @@ public:
     void send_telemetry(CanNode& can, std::int64_t t_ns, Heartbeat& faults) noexcept override;
     [[nodiscard]] std::uint64_t drops() const noexcept override;
     [[nodiscard]] std::uint64_t made() const noexcept override { return stats_.frames; }
+    [[nodiscard]] std::string progress() const override;
     [[nodiscard]] std::string failure() const override;
     [[nodiscard]] std::string advice() const override;
     Status finish() override;
@@ -120,6 +124,12 @@ private:
     std::uint8_t requests_ = 0;  ///< made by readers so far; used by the CAN thread
     std::vector<FrameFeed*> feeds_;
     CameraStats stats_;
+    /// What `progress` shows of the last frame and of all.
+    struct Shown {
+        std::atomic<std::uint64_t> late{0}, skipped{0};
+        std::atomic<float> samples_per_pixel{0}, expected_error{-1};
+    } shown_;
+    const std::optional<double> late_max_;  ///< RunOptions::late_max
 
     std::string folder_;
     std::unique_ptr<RowLog> truth_log_, ledger_log_;

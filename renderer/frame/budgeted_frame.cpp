@@ -236,7 +236,8 @@ private:
         return take_first_samples(rest, Tiles::all_but_pilot);
     }
     bool take_pilot() {
-        if (passes_.pixels() / kPilotPart > rays_left()) return false;
+        if (budget_.kind == BudgetKind::rays && kMinRaysOfPilot * passes_.pixels() / kPilotPart > rays_left())
+            return false;
         PassLimit part = limit();
         part.rays /= 2;
         return pilot_ = take_first_samples(part, Tiles::pilot);
@@ -298,6 +299,8 @@ private:
     bool take_filling(const Frame& f, Fill from, Fill to, const PassLimit& l) {
         const PassCount pass = passes_.fill(f, filled_by_centres_, from, to, l);
         costs_.record(Of::fill, pass.samples, pass.wall_ns);
+        // Batches that are not full cost more: once all pixels are expected to fit, they do.
+        costs_.record(adaptive_ ? Of::centres : Of::samples, pass.samples, pass.wall_ns);
         if (!account_for(pass, l, false)) return false;
         if (account_.step == FrameStep::nothing) account_.step = step_of(4);
         to_show_ = ToShow::filled;
@@ -308,7 +311,9 @@ private:
         const PixelFill& plan = passes_.fill();
         const auto left = static_cast<double>(plan.total() - plan.total(from));
         double pixels = fitting_pixels();
+        // The first pixels of a lattice, at edges, may cost more than those before.
         if (budget_.kind == BudgetKind::time) pixels *= from.level == 0 ? kFirstFillTime : kNextFillTime;
+        if (budget_.kind == BudgetKind::rays && !filled_by_centres_ && from.level == 0) pixels *= kFirstFillRays;
         // The account has room for one more pass: only if that takes all.
         if (fills_ + 1 >= kMaxPasses && budget_.kind != BudgetKind::passes && pixels < left) return from;
         return pixels >= left ? PixelFill::all() : plan.reach(from, pixels);

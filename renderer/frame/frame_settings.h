@@ -26,7 +26,7 @@ inline constexpr std::size_t kMaxPasses = 8;  ///< after the first
 /// Path-traced frames with separate direct sunlight: the pass of direct sunlight samples.
 inline constexpr std::size_t kSunlightPass = kMaxPasses - 1;
 
-/// How far a frame got, best first. Stated in its ledger.
+/// How far a frame got. Stated in its ledger.
 enum class FrameStep : std::uint8_t {
     refined,      ///< more samples, or spp of them
     one_sample,   ///< one sample of each pixel: its centre, or the first of its sequence
@@ -36,6 +36,16 @@ enum class FrameStep : std::uint8_t {
     nothing,      ///< no pass: the image is unchanged
     sparse,       ///< between coarse_2 and one_sample, and further samples where they matter most
 };
+
+/// True if frames of step `a` are worse than those of `b`.
+[[nodiscard]] constexpr bool is_worse(FrameStep a, FrameStep b) noexcept {
+    constexpr std::array<int, 7> kRank{0, 2, 5, 3, 4, 6, 1};  // by FrameStep
+    return kRank[static_cast<std::size_t>(a)] > kRank[static_cast<std::size_t>(b)];
+}
+/// True if pixels without a sample are reconstructed.
+[[nodiscard]] constexpr bool is_filled(FrameStep s) noexcept {
+    return s == FrameStep::sparse || s == FrameStep::coarse_2 || s == FrameStep::coarse_4;
+}
 
 struct FrameBudget {
     enum class Kind : std::uint8_t {

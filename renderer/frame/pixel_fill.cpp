@@ -182,7 +182,7 @@ void PixelFill::guess_tile(const GBuffer& g_buffer, std::uint32_t tile, int stri
     if (planned == 0) return;
     if (stride == 4 || g_buffer.in_empty_space(tile)) {
         const float background = mean_band(g_buffer.background());
-        return each_place(planned, [&](std::size_t place) { guess[place] = {background, 0}; });
+        return each_place(planned, [&](std::size_t place) { guess[place] = {background, 0, false}; });
     }
     const Window w(g_buffer, tile, known);
     each_place(planned, [&](std::size_t place) {
@@ -194,9 +194,13 @@ void PixelFill::guess_tile(const GBuffer& g_buffer, std::uint32_t tile, int stri
             low = std::min(low, r), high = std::max(high, r);
             if ((side >> i & 1) != 0) sum += a.weight[i] * r, weight += a.weight[i];
         }
-        const bool differs = side != (1u << a.n) - 1;
-        guess[place] = {sum / weight, std::max(high - low, differs ? kSilhouetteContrast * most_ : 0.0f)};
+        const bool silhouette = side != (1u << a.n) - 1;
+        guess[place] = {sum / weight, high - low, silhouette};
     });
+}
+
+float PixelFill::contrast_of(const Guess& guess) const noexcept {
+    return guess.silhouette ? std::max(guess.contrast, kSilhouetteContrast * most_) : guess.contrast;
 }
 
 int PixelFill::octave_of(float contrast) const noexcept {
@@ -205,7 +209,7 @@ int PixelFill::octave_of(float contrast) const noexcept {
 }
 
 int PixelFill::level_of(std::uint32_t tile, std::size_t place) const noexcept {
-    const float contrast = guess_[tile][place].contrast;
+    const float contrast = contrast_of(guess_[tile][place]);
     if (contrast < 0) return 0;
     const std::uint64_t hash = hash_of(tile, place);
     if (hash % kComparedPart == 0) return 1;
@@ -286,10 +290,10 @@ void PixelFill::take(const GBuffer& g_buffer, std::span<const std::uint32_t> til
                 if (stride_ == 4) continue;
                 each_place(taken, [&](std::size_t place) {
                     const Guess& guess = guess_[tiles[i]][place];
-                    Comparison& c = sums[static_cast<std::size_t>(octave_of(guess.contrast))];
+                    Comparison& c = sums[static_cast<std::size_t>(octave_of(contrast_of(guess)))];
                     const double off =
                         static_cast<double>((t.r[place] + t.g[place] + t.b[place]) / 3) - guess.radiance;
-                    const auto contrast = static_cast<double>(guess.contrast);
+                    const auto contrast = static_cast<double>(contrast_of(guess));
                     c.squares += off * off, c.contrasts += contrast * contrast, c.pixels += 1;
                 });
             }
@@ -348,7 +352,7 @@ void PixelFill::reconstruct(GBuffer& g_buffer, std::span<const std::uint32_t> ti
 }
 
 double PixelFill::error_of(std::uint32_t tile, std::size_t place) const noexcept {
-    const float contrast = guess_[tile][place].contrast;
+    const float contrast = contrast_of(guess_[tile][place]);
     if (contrast < 0) return mean_square();
     const auto octave = static_cast<std::size_t>(octave_of(contrast));
     const double square = static_cast<double>(contrast) * static_cast<double>(contrast);

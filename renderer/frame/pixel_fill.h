@@ -69,13 +69,15 @@ private:
     /// What the neighbours in the coarser lattice say of a pixel: mean bands.
     struct Guess {
         float radiance = 0;
-        float contrast = -1;  ///< the neighbours' largest difference; negative: not planned
+        float contrast = -1;      ///< the neighbours' largest difference; negative: not planned
+        bool silhouette = false;  ///< passes between them
     };
     struct Window;
 
     void guess_tile(const GBuffer& g_buffer, std::uint32_t tile, int stride,
                     const std::vector<std::uint64_t>& known) noexcept;
     void reconstruct_tile(GBuffer& g_buffer, std::uint32_t tile, int stride) noexcept;
+    [[nodiscard]] float contrast_of(const Guess& guess) const noexcept;
     [[nodiscard]] int octave_of(float contrast) const noexcept;
     [[nodiscard]] int level_of(std::uint32_t tile, std::size_t place) const noexcept;
 

@@ -35,6 +35,8 @@ inline constexpr double kMinRemainder = 0.05;
 inline constexpr double kMaxPilotPrediction = 0.85;
 /// The pilot pass is this part of the tiles.
 inline constexpr std::uint64_t kPilotPart = 16;
+/// Rays left for each sample of the pilot pass, which may take half of them.
+inline constexpr std::uint64_t kMinRaysOfPilot = 12;
 
 /// Separate direct sunlight gets samples of its own, with this fraction of the budget, if the budget has this many
 /// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate. craft-paths at 256 x
@@ -112,6 +114,8 @@ inline constexpr double kSparseFill = 0.5, kAllCentresRays = 3;
 inline constexpr double kMinFill = 0.005;
 /// Parts of the remaining time for the next pixels, and for those after them.
 inline constexpr double kFirstFillTime = 0.6, kNextFillTime = 0.85;
+/// The same of the remaining rays, where a sample may take any number of them. craft-paths.
+inline constexpr double kFirstFillRays = 0.5;
 
 // Estimates of variance.
 

@@ -65,7 +65,7 @@ TEST(BenchLadder, AMechanismEarnsWhatItsAbsenceCostsAtEqualError) {
 
 TEST(BenchLadder, SpeedUpsAreOfOneKindOfBudgets) {
     Rung coarse = adaptive(0.001, 0.9);
-    coarse.step = FrameStep::coarse_2;
+    coarse.step = FrameStep::no_indirect;
     const Ladder ladder = beside_the_loop({rung("1 spp", 4, 0.5), coarse, adaptive(2, 0.5), adaptive(1, 0.5),
                                            adaptive(0.5, 0.5), adaptive(1, 0.1)})
                               .ladder;
@@ -90,16 +90,24 @@ TEST(BenchLadder, PredictedErrorsLieBetweenTheirBounds) {
         EXPECT_NE(only_fault(beside_the_loop({r})).find("box, 16 spp: the predicted error is"), std::string::npos)
             << bad;
     }
+    r.step = FrameStep::sparse;  // with reconstructed pixels
+    for (const double good : {0.71, 1.49}) {
+        r.predicted = good * r.rmse.value;
+        EXPECT_TRUE(bench_faults(beside_the_loop({r})).empty()) << good;
+    }
+    r.predicted = 1.51 * r.rmse.value;
+    EXPECT_EQ(bench_faults(beside_the_loop({r})).size(), 1u);
 }
 
 TEST(BenchLadder, AMissingPredictionIsAFaultUnlessTheFrameLeftSomethingOut) {
     Rung r = adaptive(1, 0.5);
     r.predicted = {};
-    for (const FrameStep step : {FrameStep::refined, FrameStep::one_sample}) {
+    for (const FrameStep step :
+         {FrameStep::refined, FrameStep::one_sample, FrameStep::sparse, FrameStep::coarse_2, FrameStep::coarse_4}) {
         r.step = step;
         EXPECT_NE(only_fault(beside_the_loop({r})).find("have no error estimate"), std::string::npos);
     }
-    for (const FrameStep step : {FrameStep::no_indirect, FrameStep::coarse_2, FrameStep::coarse_4}) {
+    for (const FrameStep step : {FrameStep::no_indirect, FrameStep::nothing}) {
         r.step = step;
         EXPECT_TRUE(bench_faults(beside_the_loop({r})).empty());
     }

@@ -155,7 +155,7 @@ LoopRun bad_run() {
     camera.stats.skipped = 1;
     camera.stats.deadline_missed = 2;
     camera.stats.steps.front() = 8;
-    camera.stats.steps.back() = 1;
+    camera.stats.steps[static_cast<std::size_t>(FrameStep::nothing)] = 1;
     for (int i = 0; i < 7; ++i) camera.stats.late.add(-25'000'000);
     for (int i = 0; i < 2; ++i) camera.stats.late.add(5'000'000);
     return run;

@@ -135,10 +135,9 @@ TEST(BudgetError, SamplesOfSunlightAloneReduceItWherePathsOnlyAddToSunlight) {
     }
 }
 
-TEST(BudgetError, IsNotEstimatedWhereLightIsLeftOutOrPixelsAreCoarse) {
+TEST(BudgetError, IsNotEstimatedWhereLightIsLeftOut) {
     const BudgetView v = craft_over_a_globe();
-    for (const FrameStep step :
-         {FrameStep::no_indirect, FrameStep::coarse_2, FrameStep::coarse_4, FrameStep::nothing}) {
+    for (const FrameStep step : {FrameStep::no_indirect, FrameStep::nothing}) {
         FrameAccount account;
         account.step = step;
         EXPECT_LT(render(v, replay_of(rays_a_pixel(v, 0, 1, Method::path), account)).account.standard_error, 0);

@@ -202,16 +202,17 @@ private:
         }
     }
 
-    /// Takes one sample per pixel if that is expected to take at most half of the time left; a quarter of that time
-    /// is kept for a coarser image in case it takes much longer.
+    /// Takes one sample per pixel if that is expected to fit well; a tenth of the time left is kept for a coarser
+    /// image in case it takes much longer.
     bool take_if_affordable() {
-        const Of cost = adaptive_ ? Of::centres : Of::samples;
         const std::int64_t left = ns_left();
-        if (!costs_.known(cost) || costs_.expected_ns(cost, passes_.pixels()) > left / 2) return false;
+        const double expected = static_cast<double>(costs_.expected_ns(cost_of_one(), passes_.pixels()));
+        if (!costs_.known(cost_of_one()) || expected > kMaxFirstTime * static_cast<double>(left)) return false;
         PassLimit most = limit();
-        most.until_ns -= left / 4;
+        most.until_ns -= left / 10;
         return take_one_sample(most);
     }
+    [[nodiscard]] Of cost_of_one() const { return adaptive_ ? Of::centres : Of::samples; }
 
     [[nodiscard]] FrameStep recorded_step() const { return static_cast<FrameStep>(budget_.step); }
     void replay_first_image() {
@@ -274,7 +275,7 @@ private:
                 from = to;
             }
             account_.step = step_of(stride);
-            if (stride == 2 && adaptive_ && refine_sparse()) return;
+            if (stride == 2 && adaptive_ && worth_planning() && refine_sparse()) return;
         }
     }
     /// Sun-only direct lighting: once the contrasts of one pixel in 2 x 2 are known, more samples where these are
@@ -298,9 +299,8 @@ private:
     }
     bool take_filling(const Frame& f, Fill from, Fill to, const PassLimit& l) {
         const PassCount pass = passes_.fill(f, filled_by_centres_, from, to, l);
-        costs_.record(Of::fill, pass.samples, pass.wall_ns);
-        // Batches that are not full cost more: once all pixels are expected to fit, they do.
-        costs_.record(adaptive_ ? Of::centres : Of::samples, pass.samples, pass.wall_ns);
+        // A batch that is not full takes as long.
+        costs_.record(cost_of_one(), kLanes * pass.batches, pass.wall_ns);
         if (!account_for(pass, l, false)) return false;
         if (account_.step == FrameStep::nothing) account_.step = step_of(4);
         to_show_ = ToShow::filled;
@@ -325,7 +325,8 @@ private:
             case BudgetKind::rays:
                 return static_cast<double>(rays_left()) /
                        (filled_by_centres_ ? 2 : (rays_each_.sample + rays_each_.path) / kNextPassRaysOfPaths);
-            case BudgetKind::time: return static_cast<double>(costs_.fitting(Of::fill, ns_left()));
+            case BudgetKind::time:
+                return kFilledLanes * static_cast<double>(costs_.fitting(cost_of_one(), ns_left()));
             default: return 0;
         }
     }

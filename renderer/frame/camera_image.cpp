@@ -133,11 +133,14 @@ struct CameraRenderer::Impl {
         return budget;
     }
     void learn(const FrameAccount& account, const FrameSettings& settings, std::int64_t wall_ns) {
-        double ns = static_cast<double>(wall_ns);
-        if (account.timed)
-            ns *= static_cast<double>(passes.pixels()) * settings.spp /
-                  static_cast<double>(std::max<std::uint64_t>(account.samples, 1));
-        expected_ns = static_cast<std::int64_t>(ns);
+        if (!account.timed) {
+            expected_ns = wall_ns;
+            return;
+        }
+        const PassCosts::Of one = settings.spp == 1 && costs.known(PassCosts::Of::centres) ? PassCosts::Of::centres
+                                                                                           : PassCosts::Of::samples;
+        if (costs.known(one))
+            expected_ns = costs.expected_ns(one, passes.pixels() * static_cast<std::uint64_t>(settings.spp));
     }
 
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {

@@ -29,13 +29,14 @@ struct PassLimit {
 struct PassCount {
     bool complete = true;
     std::uint64_t samples = 0, rays = 0;
+    std::uint64_t batches = 0;               ///< of at most 16 samples
     std::uint64_t paths = 0, path_rays = 0;  ///< samples with a path; rays beyond first surfaces
     std::uint64_t met = 0, separate = 0;     ///< samples that hit a surface; those with separate direct sunlight
     std::int64_t wall_ns = 0;
 
     PassCount& operator+=(const PassCount& b) noexcept {
         complete = complete && b.complete;
-        samples += b.samples, rays += b.rays, paths += b.paths, path_rays += b.path_rays;
+        samples += b.samples, rays += b.rays, batches += b.batches, paths += b.paths, path_rays += b.path_rays;
         met += b.met, separate += b.separate, wall_ns += b.wall_ns;
         return *this;
     }

@@ -5,7 +5,6 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 
@@ -103,9 +102,28 @@ struct PixelFill::Window {
         }
         return a;
     }
+    /// The darkest and the brightest neighbour.
+    [[nodiscard]] std::pair<float, float> range(const Around& a) const {
+        float low = radiance[a.at[0]], high = low;
+        for (std::size_t i = 1; i < a.n; ++i)
+            low = std::min(low, radiance[a.at[i]]), high = std::max(high, radiance[a.at[i]]);
+        return {low, high};
+    }
+    /// True if all neighbours lie on one side: the usual case.
+    [[nodiscard]] bool one_side(const Around& a) const {
+        const std::uint32_t first = surface[a.at[0]] >> 2;
+        float nearest = depth[a.at[0]], farthest = nearest;
+        for (std::size_t i = 1; i < a.n; ++i) {
+            if (surface[a.at[i]] >> 2 != first) return false;
+            nearest = std::min(nearest, depth[a.at[i]]), farthest = std::max(farthest, depth[a.at[i]]);
+        }
+        return farthest - nearest <= kOneSurfaceGap * nearest;
+    }
     /// The neighbours on the side of a silhouette with the largest weight: a bit for each. `hash` decides between
     /// equal ones.
     [[nodiscard]] std::uint32_t side(const Around& a, std::uint64_t hash) const {
+        const std::uint32_t all = (1u << a.n) - 1;
+        if (one_side(a)) return all;
         std::uint32_t best = 0;
         float most = 0;
         for (std::size_t k = 0; k < a.n; ++k) {
@@ -175,25 +193,22 @@ constexpr int y_of(std::size_t place) {
 
 }  // namespace
 
-void PixelFill::guess_tile(const GBuffer& g_buffer, std::uint32_t tile, int stride,
-                           const std::vector<std::uint64_t>& known) noexcept {
-    const std::uint64_t planned = lattice(stride) & ~known[tile] & within(width_, height_, tile, tiles_x_);
+void PixelFill::guess_tile(const GBuffer& g_buffer, std::uint32_t tile, int stride) noexcept {
+    const std::uint64_t planned = lattice(stride) & ~traced_[tile] & within(width_, height_, tile, tiles_x_);
     PerPixel<Guess>& guess = guess_[tile];
     if (planned == 0) return;
     if (stride == 4 || g_buffer.in_empty_space(tile)) {
         const float background = mean_band(g_buffer.background());
         return each_place(planned, [&](std::size_t place) { guess[place] = {background, 0, false}; });
     }
-    const Window w(g_buffer, tile, known);
+    const Window w(g_buffer, tile, traced_);
     each_place(planned, [&](std::size_t place) {
         const Window::Around a = w.around(x_of(place), y_of(place), stride);
         const std::uint32_t side = w.side(a, hash_of(tile, place));
-        float low = INFINITY, high = -INFINITY, sum = 0, weight = 0;
-        for (std::size_t i = 0; i < a.n; ++i) {
-            const float r = w.radiance[a.at[i]];
-            low = std::min(low, r), high = std::max(high, r);
-            if ((side >> i & 1) != 0) sum += a.weight[i] * r, weight += a.weight[i];
-        }
+        const auto [low, high] = w.range(a);
+        float sum = 0, weight = 0;
+        for (std::size_t i = 0; i < a.n; ++i)
+            if ((side >> i & 1) != 0) sum += a.weight[i] * w.radiance[a.at[i]], weight += a.weight[i];
         const bool silhouette = side != (1u << a.n) - 1;
         guess[place] = {sum / weight, high - low, silhouette};
     });
@@ -225,7 +240,7 @@ void PixelFill::plan(const GBuffer& g_buffer, std::span<const std::uint32_t> til
     compared_ = {};
     over_tiles(tiles, [&](std::uint32_t tile) {
         guess_[tile].fill({});
-        guess_tile(g_buffer, tile, stride, traced_);
+        guess_tile(g_buffer, tile, stride);
     });
     if (stride == 2) {
         most_ = tbb::parallel_reduce(
@@ -238,15 +253,22 @@ void PixelFill::plan(const GBuffer& g_buffer, std::span<const std::uint32_t> til
             [](float a, float b) { return std::max(a, b); });
         if (!(most_ > 0)) most_ = 1;
     }
-    std::array<std::atomic<std::uint32_t>, kLevels + 1> pixels{};
-    over_tiles(tiles, [&](std::uint32_t tile) {
-        for (std::size_t place = 0; place < kTilePixels; ++place) {
-            const int level = level_of(tile, place);
-            level_[tile][place] = static_cast<std::int16_t>(level);
-            if (level > 0) pixels[static_cast<std::size_t>(level)].fetch_add(1, std::memory_order_relaxed);
-        }
-    });
-    for (std::size_t i = 0; i < pixels.size(); ++i) pixels_[i] = pixels[i];
+    using Levels = std::array<std::uint32_t, kLevels + 1>;
+    pixels_ = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, tiles.size(), 8 * kGrain), Levels{},
+        [&](const auto& range, Levels pixels) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i)
+                for (std::size_t place = 0; place < kTilePixels; ++place) {
+                    const int level = level_of(tiles[i], place);
+                    level_[tiles[i]][place] = static_cast<std::int16_t>(level);
+                    ++pixels[static_cast<std::size_t>(level)];
+                }
+            return pixels;
+        },
+        [](Levels a, const Levels& b) {
+            for (std::size_t i = 0; i < a.size(); ++i) a[i] += b[i];
+            return a;
+        });
 }
 
 std::uint64_t PixelFill::total(Stage stage) const noexcept {
@@ -318,13 +340,20 @@ void PixelFill::reconstruct_tile(GBuffer& g_buffer, std::uint32_t tile, int stri
         t.reused[place] = like != nullptr ? like->reused[there] : 0;
     };
     if (g_buffer.in_empty_space(tile))
-        return each_place(wanted, [&](std::size_t place) { put(place, g_buffer.background(), nullptr, 0); });
+        return each_place(wanted, [&](std::size_t place) {
+            put(place, g_buffer.background(), nullptr, 0);
+            if (stride < stride_) guess_[tile][place] = {mean_band(g_buffer.background()), 0, false};
+        });
     const Window w(g_buffer, tile, known_);
     each_place(wanted, [&](std::size_t place) {
         const Window::Around a = w.around(x_of(place), y_of(place), stride);
         const std::uint32_t side = w.side(a, hash_of(tile, place));
         Rgb sum{};
         float weight = 0;
+        if (stride < stride_) {  // no plan has reached the pixel
+            const auto [low, high] = w.range(a);
+            guess_[tile][place] = {low, high - low, side != (1u << a.n) - 1};
+        }
         for (std::uint32_t rest = side; rest != 0; rest &= rest - 1) {
             const auto i = static_cast<std::size_t>(std::countr_zero(rest));
             const auto [of, there] = w.pixel(a.at[i]);
@@ -341,8 +370,6 @@ void PixelFill::reconstruct_tile(GBuffer& g_buffer, std::uint32_t tile, int stri
 void PixelFill::reconstruct(GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
     for (const std::uint32_t tile : tiles) known_[tile] = traced_[tile], changed_[tile] = 0;
     for (const int stride : {2, 1}) {
-        if (stride < stride_)  // the contrasts of pixels that no plan has reached
-            over_tiles(tiles, [&](std::uint32_t tile) { guess_tile(g_buffer, tile, stride, known_); });
         over_tiles(tiles, [&](std::uint32_t tile) { reconstruct_tile(g_buffer, tile, stride); });
         for (const std::uint32_t tile : tiles) {
             known_[tile] |= lattice(stride);

@@ -74,8 +74,7 @@ private:
     };
     struct Window;
 
-    void guess_tile(const GBuffer& g_buffer, std::uint32_t tile, int stride,
-                    const std::vector<std::uint64_t>& known) noexcept;
+    void guess_tile(const GBuffer& g_buffer, std::uint32_t tile, int stride) noexcept;
     void reconstruct_tile(GBuffer& g_buffer, std::uint32_t tile, int stride) noexcept;
     [[nodiscard]] float contrast_of(const Guess& guess) const noexcept;
     [[nodiscard]] int octave_of(float contrast) const noexcept;

@@ -197,6 +197,7 @@ private:
     }
     void count_batch(const SampleBatch& b, const TracedRays& p) {
         count_.samples += b.samples.n;
+        ++count_.batches;
         count_.paths += static_cast<std::uint64_t>(std::popcount(b.path_lanes));
         if (f.parts == LightParts::both) {
             count_.met += static_cast<std::uint64_t>(std::popcount(p.hits.met));

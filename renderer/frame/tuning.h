@@ -24,8 +24,8 @@ inline constexpr double kSunlightPassTime = 0.7;
 /// Fractions of the remaining rays. With Sun-only direct lighting the number of samples predicts the number of rays
 /// almost exactly (docking); with paths it varies by a tenth from one pass to the next (craft-paths, cornell).
 inline constexpr double kFirstPassRays = 0.85, kNextPassRays = 0.96, kNextPassRaysOfPaths = 0.9;
-/// A frame of a fixed number of samples is expected to take its last time, or that of as many samples in a frame
-/// that the clock has ended; it may be expected to take this part of the time left.
+/// A frame of a fixed number of samples is expected to take its last time or, after frames that the clock has
+/// ended, that of as many of their samples; it may be expected to take this part of the time left.
 inline constexpr double kMaxAim = 0.75;
 /// A remainder below this fraction of the budget is not worth another pass.
 inline constexpr double kMinRemainder = 0.05;
@@ -54,7 +54,7 @@ inline constexpr std::int64_t kMinSlack_ns = 300'000, kSlackPart = 40;
 
 /// ns per pixel or sample of each kind of pass before any measurement: centres, plan, samples, sunlight, show;
 /// plan, pixels and show of a filled image.
-inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10, 30, 200, 60};
+inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10, 30, 60};
 /// After a skipped pass the estimate falls by this factor, to no less than this fraction of the last measurement.
 inline constexpr double kSkippedDecay = 0.95, kMinDecayed = 0.25;
 /// Weight of a new measurement, which counts as within this factor of the estimate.
@@ -112,6 +112,9 @@ inline constexpr double kNoiseOfTraced = 0.6, kNoiseOfFilled = 0.4;
 inline constexpr double kSparseFill = 0.5, kAllCentresRays = 3;
 /// A pass is worth its start if it traces this part of a lattice.
 inline constexpr double kMinFill = 0.005;
+/// Pixels in a batch of 16 while lattices are filled, about, as a part. Time of one sample per pixel that is
+/// attempted, as a part of the time left. Runs of docking.
+inline constexpr double kFilledLanes = 0.5, kMaxFirstTime = 0.8;
 /// Parts of the remaining time for the next pixels, and for those after them.
 inline constexpr double kFirstFillTime = 0.6, kNextFillTime = 0.85;
 /// The same of the remaining rays, where a sample may take any number of them. craft-paths.

@@ -131,10 +131,10 @@ TEST(EmbeddedLine, AnyOneWrongBitIsFound) {
 TEST(EmbeddedLine, UnknownChoicesAreRefused) {
     Row row{};
     FrameLedger ledger;
-    ledger.step = 6;
+    ledger.step = 7;
     ASSERT_TRUE(encode_embedded_line(ledger, row));
     EXPECT_FALSE(decode_embedded_line(row));
-    ledger.step = 5;
+    ledger.step = 6;
     ledger.budget_kind = static_cast<BudgetKind>(3);
     ASSERT_TRUE(encode_embedded_line(ledger, row));
     EXPECT_FALSE(decode_embedded_line(row));

@@ -142,8 +142,8 @@ TEST(BudgetFrame, StepsGoDownOneByOneAndEachShowsAWholeImage) {
         }
         EXPECT_EQ(seen, method == Method::direct
                             ? (std::vector{Step::nothing, Step::coarse_4, Step::sparse, Step::refined})
-                            : (std::vector{Step::nothing, Step::no_indirect, Step::coarse_4, Step::coarse_2,
-                                           Step::one_sample, Step::refined}));
+                            : (std::vector{Step::nothing, Step::no_indirect, Step::coarse_2, Step::one_sample,
+                                           Step::refined}));
     }
 }
 

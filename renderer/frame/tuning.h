@@ -106,7 +106,7 @@ inline constexpr double kMinComparisons = 30, kFillErrorOfContrast = 0.5;
 inline constexpr std::uint64_t kComparedPart = 64;
 /// Where samples are noisy, so are the neighbours with which they are compared: the squared error of a traced and
 /// of a reconstructed pixel, as parts of the mean squared difference. cornell.
-inline constexpr double kNoiseOfTraced = 0.6, kNoiseOfFilled = 0.4;
+inline constexpr double kNoiseOfTraced = 0.5, kNoiseOfFilled = 0.35;
 /// Sun-only direct lighting: this part of what is left after one pixel in 2 x 2 goes to further pixels, the rest to
 /// further samples; with this many rays per pixel, all centres are traced instead.
 inline constexpr double kSparseFill = 0.5, kAllCentresRays = 3;

@@ -107,10 +107,10 @@ TEST(CanLedger, CountsAndErrorsSaturate) {
 
 TEST(CanLedger, RefusesUnknownChoices) {
     FrameLedger sent, out;
-    sent.step = 6;
+    sent.step = 7;
     LedgerDecoder decoder;
     EXPECT_EQ(decoder.accept(encode_fd(sent), 0, out), DecodeStatus::not_a_number);
-    sent.step = 5;
+    sent.step = 6;
     sent.budget_kind = static_cast<BudgetKind>(3);
     EXPECT_EQ(decoder.accept(encode_fd(sent), 0, out), DecodeStatus::not_a_number);
 }

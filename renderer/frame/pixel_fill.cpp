@@ -16,13 +16,13 @@ namespace {
 
 using namespace tuning;
 
-constexpr std::size_t kGrain = 16;  ///< tiles per task
-constexpr int kBorder = 2, kSide = kTile + 2 * kBorder;
+constexpr std::size_t kFillGrain = 16;  ///< tiles per task
+constexpr int kWindowBorder = 2, kWindowSide = kTile + 2 * kWindowBorder;
 
 template <class Do>
-void over_tiles(std::span<const std::uint32_t> tiles, Do&& act) {
+void over_filled_tiles(std::span<const std::uint32_t> tiles, Do&& act) {
     tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, tiles.size(), kGrain),
+        tbb::blocked_range<std::size_t>(0, tiles.size(), kFillGrain),
         [&](const auto& range) {
             for (std::size_t i = range.begin(); i != range.end(); ++i) act(tiles[i]);
         },
@@ -49,9 +49,9 @@ bool together(std::uint32_t surface_a, float depth_a, std::uint32_t surface_b, f
 
 /// A tile with its surroundings.
 struct PixelFill::Window {
-    std::array<float, kSide * kSide> radiance{}, depth{};
-    std::array<std::uint32_t, kSide * kSide> surface{};
-    std::array<bool, kSide * kSide> known{};
+    std::array<float, kWindowSide * kWindowSide> radiance{}, depth{};
+    std::array<std::uint32_t, kWindowSide * kWindowSide> surface{};
+    std::array<bool, kWindowSide * kWindowSide> known{};
     std::array<const GBufferTile*, 9> tiles{};  ///< null: shows the background
 
     Window(const GBuffer& g, std::uint32_t tile, const std::vector<std::uint64_t>& known_pixels) {
@@ -66,8 +66,8 @@ struct PixelFill::Window {
                 tiles[static_cast<std::size_t>((row + 1) * 3 + column + 1)] = t;
                 const std::uint64_t is_known = t == nullptr ? ~std::uint64_t{0} : known_pixels[other];
                 const int x_end = g.width() - x * kTile, y_end = g.height() - y * kTile;
-                const auto first = [](int k) { return k < 0 ? kTile - kBorder : 0; };
-                const auto end = [](int k, int last) { return std::min(k > 0 ? kBorder : kTile, last); };
+                const auto first = [](int k) { return k < 0 ? kTile - kWindowBorder : 0; };
+                const auto end = [](int k, int last) { return std::min(k > 0 ? kWindowBorder : kTile, last); };
                 for (int py = first(row); py < end(row, y_end); ++py)
                     for (int px = first(column); px < end(column, x_end); ++px) {
                         const std::size_t at = cell(px + column * kTile, py + row * kTile);
@@ -81,7 +81,7 @@ struct PixelFill::Window {
             }
     }
     static constexpr std::size_t cell(int x, int y) {
-        return static_cast<std::size_t>((y + kBorder) * kSide + x + kBorder);
+        return static_cast<std::size_t>((y + kWindowBorder) * kWindowSide + x + kWindowBorder);
     }
 
     /// Known neighbours of a pixel at a distance of `stride` pixels, those beside it first.
@@ -140,7 +140,8 @@ struct PixelFill::Window {
     }
     /// The tile's data of a cell, null for the background, and its place there.
     [[nodiscard]] std::pair<const GBufferTile*, std::size_t> pixel(std::size_t at) const {
-        const int x = static_cast<int>(at) % kSide - kBorder, y = static_cast<int>(at) / kSide - kBorder;
+        const int x = static_cast<int>(at) % kWindowSide - kWindowBorder,
+                  y = static_cast<int>(at) / kWindowSide - kWindowBorder;
         const int column = x < 0 ? -1 : x >= kTile ? 1 : 0, row = y < 0 ? -1 : y >= kTile ? 1 : 0;
         return {tiles[static_cast<std::size_t>((row + 1) * 3 + column + 1)],
                 place_in_tile(x - column * kTile, y - row * kTile)};
@@ -238,13 +239,13 @@ void PixelFill::plan(const GBuffer& g_buffer, std::span<const std::uint32_t> til
     stride_ = stride;
     compared_coarser_ = compared_;
     compared_ = {};
-    over_tiles(tiles, [&](std::uint32_t tile) {
+    over_filled_tiles(tiles, [&](std::uint32_t tile) {
         guess_[tile].fill({});
         guess_tile(g_buffer, tile, stride);
     });
     if (stride == 2) {
         most_ = tbb::parallel_reduce(
-            tbb::blocked_range<std::size_t>(0, tiles.size(), kGrain), 0.0f,
+            tbb::blocked_range<std::size_t>(0, tiles.size(), kFillGrain), 0.0f,
             [&](const auto& range, float most) {
                 for (std::size_t i = range.begin(); i != range.end(); ++i)
                     for (const Guess& g : guess_[tiles[i]]) most = std::max(most, g.contrast);
@@ -255,7 +256,7 @@ void PixelFill::plan(const GBuffer& g_buffer, std::span<const std::uint32_t> til
     }
     using Levels = std::array<std::uint32_t, kLevels + 1>;
     pixels_ = tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, tiles.size(), 8 * kGrain), Levels{},
+        tbb::blocked_range<std::size_t>(0, tiles.size(), 8 * kFillGrain), Levels{},
         [&](const auto& range, Levels pixels) {
             for (std::size_t i = range.begin(); i != range.end(); ++i)
                 for (std::size_t place = 0; place < kTilePixels; ++place) {
@@ -303,7 +304,7 @@ void PixelFill::take(const GBuffer& g_buffer, std::span<const std::uint32_t> til
         return a;
     };
     const Comparisons more = tbb::parallel_deterministic_reduce(
-        tbb::blocked_range<std::size_t>(0, tiles.size(), kGrain), Comparisons{},
+        tbb::blocked_range<std::size_t>(0, tiles.size(), kFillGrain), Comparisons{},
         [&](const auto& range, Comparisons sums) {
             for (std::size_t i = range.begin(); i != range.end(); ++i) {
                 const GBufferTile& t = g_buffer.tile(tiles[i]);
@@ -370,7 +371,7 @@ void PixelFill::reconstruct_tile(GBuffer& g_buffer, std::uint32_t tile, int stri
 void PixelFill::reconstruct(GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
     for (const std::uint32_t tile : tiles) known_[tile] = traced_[tile], changed_[tile] = 0;
     for (const int stride : {2, 1}) {
-        over_tiles(tiles, [&](std::uint32_t tile) { reconstruct_tile(g_buffer, tile, stride); });
+        over_filled_tiles(tiles, [&](std::uint32_t tile) { reconstruct_tile(g_buffer, tile, stride); });
         for (const std::uint32_t tile : tiles) {
             known_[tile] |= lattice(stride);
             if (changed_[tile] != 0) g_buffer.set_something(tile);

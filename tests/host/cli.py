@@ -239,7 +239,7 @@ def check_silence():
     said = narpa("fly", flight, "--can", f"slcan:{support.free_port()}", "--wait", "3", status=3).stderr.decode()
     expect("waiting at most 3 s for `narpa run`" in said, f"fly tells what it waits for: {said}")
     said = narpa("run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "4").stderr.decode()
-    expect(re.search(r"running: t = .+ s of 4 s, \d+ %", said), f"run tells where it is: {said[:200]}")
+    expect(re.search(r"running: t = .+ s of 4 s; .+: \d+ late, \d+ skipped, .+, \d+ %", said), f"run tells where it is: {said[:300]}")
 
 
 def check_modes():

@@ -132,7 +132,7 @@ Outcome render(const RenderOptions& o) {
             return Step{static_cast<double>(pixels_done) / pixels, {}};
         });
         threads.arena.execute([&] {
-            ledger = unit.expose(frame, t_ns, start_ns + budget_ns, aovs, &pixels_done);
+            ledger = unit.expose(frame, t_ns, budget_ns > 0 ? start_ns + budget_ns : 0, aovs, &pixels_done);
             unit.embed(ledger);
         });
     }

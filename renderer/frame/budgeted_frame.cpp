@@ -76,6 +76,7 @@ private:
     void begin(const Frame& f) {
         frame_ = &f;
         passes_.begin(f, sample_.lens);
+        passes_.keep_fill();
         if (!adaptive_) passes_.make_plan(sample_, false);
     }
 
@@ -185,6 +186,10 @@ private:
     }
 
     void take_first_image() {
+        if (passes_.pixels() == 0 && budget_.kind != BudgetKind::passes) {  // nothing but the background
+            take_one_sample({});
+            return;
+        }
         switch (budget_.kind) {
             case BudgetKind::samples:
             case BudgetKind::aim: break;
@@ -282,6 +287,7 @@ private:
     /// large gain more than the first samples of the pixels where they are small. False: replayed frame without.
     bool refine_sparse() {
         if (budget_.kind == BudgetKind::passes && recorded_step() != FrameStep::sparse) return false;
+        if (fills_ == most_fills()) return true;
         passes_.plan_fill(1);
         const Fill to = budget_.kind == BudgetKind::passes
                             ? next_fill({})
@@ -314,14 +320,17 @@ private:
         // The first pixels of a lattice, at edges, may cost more than those before.
         if (budget_.kind == BudgetKind::time) pixels *= from.level == 0 ? kFirstFillTime : kNextFillTime;
         if (budget_.kind == BudgetKind::rays && !filled_by_centres_ && from.level == 0) pixels *= kFirstFillRays;
+        if (fills_ == most_fills()) return from;
         // The account has room for one more pass: only if that takes all.
-        if (fills_ + 1 >= kMaxPasses && budget_.kind != BudgetKind::passes && pixels < left) return from;
+        if (fills_ + 1 == most_fills() && budget_.kind != BudgetKind::passes && pixels < left) return from;
         return pixels >= left ? PixelFill::all() : plan.reach(from, pixels);
     }
+    /// Passes of the account that may fill the image.
+    [[nodiscard]] std::size_t most_fills() const { return separate_sunlight_ ? kSunlightPass : kMaxPasses; }
     /// Pixels that fit into the rest of the budget.
     [[nodiscard]] double fitting_pixels() const {
         switch (budget_.kind) {
-            case BudgetKind::passes: return fills_ < kMaxPasses ? budget_.passes[fills_] : 0;
+            case BudgetKind::passes: return fills_ < most_fills() ? budget_.passes[fills_] : 0;
             case BudgetKind::rays:
                 return static_cast<double>(rays_left()) /
                        (filled_by_centres_ ? 2 : (rays_each_.sample + rays_each_.path) / kNextPassRaysOfPaths);

@@ -289,7 +289,7 @@ void FramePasses::show_centres(const Frame& f, RadianceImage& out) {
 }
 
 void FramePasses::begin_fill(bool with_pilot) {
-    if (!fill_) fill_.emplace(g_buffer_);
+    keep_fill();
     fill_->begin(tiles_);
     if (!with_pilot) return;
     for (const std::uint32_t i : tiles_)

@@ -64,6 +64,10 @@ public:
     PassCount centres(const Frame& f, const PassLimit& limit);
     void show_centres(const Frame& f, RadianceImage& out);
 
+    /// Allocates the memory of `begin_fill`, which may be needed in any frame within a budget.
+    void keep_fill() {
+        if (!fill_) fill_.emplace(g_buffer_);
+    }
     /// Starts an image with less than one sample per pixel (pixel_fill.h). `with_pilot`: the tiles of the pilot
     /// pass have a sample of each pixel already.
     void begin_fill(bool with_pilot);

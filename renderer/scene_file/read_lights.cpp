@@ -36,8 +36,8 @@ Light read_light(TableReader& table, std::vector<std::string>& names, const std:
     light.kind = static_cast<Light::Kind>(*kind);
     if (light.kind == Light::Kind::directional && !table.has("look_at"))
         table.refuse("position_m",
-                     "a directional light shines from infinitely far; its position only says where "
-                     "it looks from, with look_at");
+                     "a directional light shines from infinitely far; its position is used only with "
+                     "look_at, to give its direction");
     const std::string_view brightness = light_kinds()[*kind].rows.front().name;
     const auto emission = table.rgb(brightness);
     light.emission = emission.value_or(Rgb{});

@@ -280,5 +280,34 @@ TEST(BudgetFrame, AllocatesNothingAfterTheFirstFrame) {
     EXPECT_EQ(count.on_all_threads(), 0u);
 }
 
+TEST(BudgetFrame, TheFirstFrameThatDoesNotFitAllocatesNothing) {
+    // In a run the machine may be overloaded for the first time at any moment.
+    if (!kAllocationsAreCounted) GTEST_SKIP() << "a sanitizer has the heap";
+    const BudgetView v = craft_over_a_globe();
+    CameraRenderer renderer(v.render_scene, v.camera);
+    RadianceImage image(v.camera.width, v.camera.height);
+    tbb::task_arena arena(1);
+    arena.execute([&] {
+        for (std::uint32_t i = 0; i < 10; ++i) renderer.render(v.at, v.pose, rays_a_pixel(v, 30, i), image);
+        const AllocationCounter count;
+        const FrameAccount account = renderer.render(v.at, v.pose, rays_a_pixel(v, 0.3, 10), image);
+        EXPECT_EQ(count.on_all_threads(), 0u);
+        EXPECT_TRUE(is_filled(account.step));
+    });
+}
+
+TEST(BudgetFrame, AnEmptyViewShowsTheBackgroundFromTheFirstTimedFrameOn) {
+    BudgetView v = craft_over_a_globe();
+    v.pose = looking({12, 7, 9}, {30, 20, 30});  // away from all bodies
+    for (const Method method : {Method::direct, Method::path}) {
+        FrameSettings s = rays_a_pixel(v, 0, 0, method);
+        s.budget.kind = BudgetKind::time;
+        s.budget.deadline_ns = now_ns() + 1'000'000'000;
+        const Shown shown = render(v, s);
+        EXPECT_TRUE(is_whole(shown.image));
+        EXPECT_EQ(shown.account.standard_error, 0);
+    }
+}
+
 }  // namespace
 }  // namespace narpa

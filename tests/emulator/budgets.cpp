@@ -215,6 +215,25 @@ TEST(Report, CountsFramesByLateness) {
     EXPECT_EQ(against_deadline(0.3), "0.30 ms after");
 }
 
+/// Samples that take half a second of one thread at least, where a frame is due each tenth of a second.
+TEST_F(Budgets, InRealTimeTheDeadlineBoundsTheSamplesUnlessTheSceneKeepsThem) {
+    for (const bool keeps : {true, false}) {
+        RunOptions o;
+        o.duration_s = 0.5;
+        o.threads = 1;
+        o.video = {{"nav", folder_ / "nav.y4m"}};
+        o.log_folder = folder_ / "log";
+        const std::string keys = keeps ? "spp = 1500" : "spp = 1500\nkeep_deadline = false";
+        ASSERT_TRUE(run(scene_with(keys), o));
+        const std::vector<Row> rows = read_rows(folder_ / "log/nav.ledger.csv");
+        ASSERT_FALSE(rows.empty());
+        for (const Row& row : rows) {
+            EXPECT_EQ(row.at("budget_kind"), keeps ? "time" : "samples");
+            EXPECT_EQ(row.at("budget"), keeps ? "100000000" : "1500");
+        }
+    }
+}
+
 /// In real time: how far each frame gets is up to the machine, what is said of it must fit together.
 class BudgetOfTime : public Budgets, public ::testing::WithParamInterface<const char*> {};
 

@@ -241,6 +241,11 @@ def check_silence():
     said = narpa("run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "4").stderr.decode()
     expect(re.search(r"running: t = .+ s of 4 s; .+: \d+ late, \d+ skipped, .+, \d+ %", said), f"run tells where it is: {said[:300]}")
 
+    said = narpa("run", support.SCENE, "--video", f"{support.CAMERA}=none", "--duration", "1", "--threads", "1", "--spp", "500",
+                 "--late-max", "10", status=1).stderr.decode()
+    expect(re.search(r"failed: camera .+: \d+ of \d+ frames were late or skipped, expected at most 10 %", said),
+           f"run tells that frames were late: {said[-300:]}")
+
 
 def check_modes():
     """`fly` in another mode than the emulator fails at the first heartbeat and sends no command."""

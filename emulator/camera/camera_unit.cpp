@@ -91,9 +91,15 @@ void CameraUnit::warm_up() {
     if (all.kind == FrameBudget::Kind::aim)  // measures what `spp` takes
         embed(expose(0, 0, FrameBudget{}, nullptr, nullptr));
     if (all.kind != FrameBudget::Kind::samples) {
+        const auto pixels = static_cast<std::uint32_t>(radiance_.pixels.size());
+        FrameBudget coarse;  // measures what a frame takes that has less than one sample per pixel
+        coarse.kind = FrameBudget::Kind::passes;
+        coarse.step = static_cast<std::uint8_t>(FrameStep::coarse_2);
+        coarse.passes[0] = pixels;
+        embed(expose(0, 0, coarse, nullptr, nullptr));
         all.kind = FrameBudget::Kind::passes;
         all.step = static_cast<std::uint8_t>(FrameStep::refined);
-        all.passes[0] = all.passes[kSunlightPass] = static_cast<std::uint32_t>(radiance_.pixels.size());
+        all.passes[0] = all.passes[kSunlightPass] = pixels;
     }
     embed(expose(0, 0, all, nullptr, nullptr));
 }
@@ -123,8 +129,8 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     t_radiance_ns_ = monotonic_ns();
     durations_.radiance_ns = t_radiance_ns_ - begun_ns;
     const std::int64_t lit_ns = t_radiance_ns_;
-    // The allowance includes the time by which the renderer stopped late.
-    if (account.timed) t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
+    // The allowance includes the time by which the renderer stopped late, unless no less could be done.
+    if (account.timed && !account.coarsest_late) t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
     narpa::expose(camera_, radiance_, settings.seed, frame, bytes_, sensor_array_.get());
     if (camera_.control) read_out(format(), settings_.region, settings_.binning, bytes_);
     durations_.sensor_ns = monotonic_ns() - lit_ns;

@@ -84,8 +84,12 @@ private:
     [[nodiscard]] std::uint64_t rays_left() const { return budget_.rays - std::min(budget_.rays, rays_); }
     [[nodiscard]] std::int64_t time_given() const { return budget_.deadline_ns - start_ns_; }
     [[nodiscard]] std::int64_t ns_left() const {
-        return budget_.deadline_ns - slack_ns_ -
-               costs_.expected_ns(filled_ ? Of::fill_show : Of::show, out_.pixels.size()) - now_ns();
+        return budget_.deadline_ns - slack_ns_ - (filled_ ? ns_to_show_filled() : ns_to_show()) - now_ns();
+    }
+    [[nodiscard]] std::int64_t ns_to_show() const { return costs_.expected_ns(Of::show, out_.pixels.size()); }
+    [[nodiscard]] std::int64_t ns_to_show_filled() const {
+        const auto lattices = static_cast<std::uint64_t>(passes_.fill().lattices_left());
+        return ns_to_show() + costs_.expected_ns(Of::reconstruction, lattices * passes_.pixels());
     }
     [[nodiscard]] PassLimit limit() const {
         PassLimit l;
@@ -253,7 +257,6 @@ private:
 
     /// Traces the pixels of ever finer lattices, those with the largest contrasts first.
     void fill() {
-        const bool timed = budget_.kind == BudgetKind::time;
         if (!adaptive_ && !pilot_ && (budget_.kind != BudgetKind::rays) && paths_fit()) take_pilot();
         // If even a few paths do not fit, the image shows direct light alone.
         filled_by_centres_ = adaptive_ || !pilot_;
@@ -264,46 +267,85 @@ private:
             change_to(f);
         filled_ = true;
         passes_.begin_fill(pilot_);
-        for (const int stride : {4, 2, 1}) {
+        const int first = take_first_lattice(f);
+        if (first == 0) return;
+        for (int stride = first; stride >= 1; stride /= 2) {
             if (stride == 1 && filled_by_centres_ && !adaptive_) break;
-            const std::int64_t start = now_ns();
-            passes_.plan_fill(stride);
-            if (stride < 4) costs_.record(Of::fill_plan, passes_.pixels(), now_ns() - start);
-            for (Fill from{}; passes_.fill().total() > passes_.fill().total(from);) {
-                const Fill to = stride == 4 ? PixelFill::all() : next_fill(from);
-                const std::uint64_t pixels = passes_.fill().total(to) - passes_.fill().total(from);
-                if (static_cast<double>(pixels) < kMinFill * static_cast<double>(passes_.fill().total())) return;
-                // A complete coarse image is made even if it is late.
-                const PassLimit l = stride == 4 && timed ? PassLimit{} : limit();
-                if (!take_filling(f, from, to, l)) return;
-                account_.passes[fills_++] = static_cast<std::uint32_t>(pixels);
-                from = to;
-            }
+            if (stride < first && !take_lattice(f, stride)) return;
             account_.step = step_of(stride);
-            if (stride == 2 && adaptive_ && worth_planning() && refine_sparse()) return;
+            if (stride == 2 && adaptive_ && worth_sparse() && refine_sparse()) return;
         }
+    }
+    /// The first image: one pixel in 2 x 2, whose batches are full, if that is expected to fit; else one in 4 x 4.
+    /// It is completed even if it is late: a coarser one would take two thirds of its time. Returns the stride, 0 if
+    /// nothing was taken.
+    int take_first_lattice(const Frame& f) {
+        passes_.plan_fill(2, true);
+        const bool fits = static_cast<double>(passes_.fill().total()) <= pixels_of_first_lattice();
+        if (!fits) passes_.plan_fill(4, true);
+        const PassLimit most = budget_.kind == BudgetKind::time ? PassLimit{} : limit();
+        if (!take_planned(f, {}, PixelFill::all(), most)) return 0;
+        account_.coarsest_late = budget_.kind == BudgetKind::time && ns_left() < 0;
+        return fits ? 2 : 4;
+    }
+    [[nodiscard]] double pixels_of_first_lattice() const {
+        switch (budget_.kind) {
+            case BudgetKind::rays: return fitting_pixels() * (filled_by_centres_ ? 1 : kFirstFillRays);
+            case BudgetKind::time:
+                return costs_.known(cost_of_one())
+                           ? kMaxFirstTime * static_cast<double>(costs_.fitting(cost_of_one(), ns_left()))
+                           : 0;
+            default: return fitting_pixels();
+        }
+    }
+    /// True if the lattice is complete.
+    bool take_lattice(const Frame& f, int stride) {
+        const std::int64_t start = now_ns();
+        passes_.plan_fill(stride, false);
+        costs_.record(Of::reconstruction, passes_.pixels(), now_ns() - start);
+        const PixelFill& plan = passes_.fill();
+        for (Fill from{}; plan.total() > plan.total(from);) {
+            const Fill to = next_fill(from);
+            const auto pixels = static_cast<double>(plan.total(to) - plan.total(from));
+            if (pixels < kMinFill * static_cast<double>(plan.total()) || !take_planned(f, from, to, limit()))
+                return false;
+            from = to;
+        }
+        return true;
+    }
+    [[nodiscard]] bool worth_sparse() const {
+        if (budget_.kind != BudgetKind::time) return true;
+        const std::int64_t plans = costs_.expected_ns(Of::reconstruction, passes_.pixels()) +
+                                   costs_.expected_ns(Of::plan, passes_.pixels());
+        return static_cast<double>(plans) <= kMaxSparsePlan * static_cast<double>(ns_left());
     }
     /// Sun-only direct lighting: once the contrasts of one pixel in 2 x 2 are known, more samples where these are
     /// large gain more than the first samples of the pixels where they are small. False: replayed frame without.
     bool refine_sparse() {
         if (budget_.kind == BudgetKind::passes && recorded_step() != FrameStep::sparse) return false;
         if (fills_ == most_fills()) return true;
-        passes_.plan_fill(1);
+        passes_.plan_fill(1, false);
         const Fill to = budget_.kind == BudgetKind::passes
                             ? next_fill({})
                             : passes_.fill().reach({}, kSparseFill * fitting_pixels());
-        const std::uint64_t pixels = passes_.fill().total(to);
-        if (pixels == 0 || !take_filling(coarse_.value(), {}, to, limit())) return true;
-        account_.passes[fills_++] = static_cast<std::uint32_t>(pixels);
-        passes_.reconstruct();
+        if (passes_.fill().total(to) == 0 || !take_planned(coarse_.value(), {}, to, limit())) return true;
+        reconstruct();
         refine(FrameStep::sparse);
         return true;
+    }
+    void reconstruct() {
+        const auto lattices = static_cast<std::uint64_t>(passes_.fill().lattices_left());
+        const std::int64_t start = now_ns();
+        passes_.reconstruct();
+        // At most: where nothing was traced since the plan, nothing is left to do.
+        if (passes_.fill().reconstructs_all())
+            costs_.record(Of::reconstruction, lattices * passes_.pixels(), now_ns() - start);
     }
     [[nodiscard]] FrameStep step_of(int stride) const {
         if (filled_by_centres_ && !adaptive_) return FrameStep::no_indirect;
         return stride == 1 ? FrameStep::one_sample : stride == 2 ? FrameStep::coarse_2 : FrameStep::coarse_4;
     }
-    bool take_filling(const Frame& f, Fill from, Fill to, const PassLimit& l) {
+    bool take_planned(const Frame& f, Fill from, Fill to, const PassLimit& l) {
         const PassCount pass = passes_.fill(f, filled_by_centres_, from, to, l);
         // A batch that is not full takes as long.
         costs_.record(cost_of_one(), kLanes * pass.batches, pass.wall_ns);
@@ -311,6 +353,8 @@ private:
         if (account_.step == FrameStep::nothing) account_.step = step_of(4);
         to_show_ = ToShow::filled;
         if (!filled_by_centres_) rays_each_ = rays_each(pass);
+        account_.passes[fills_++] =
+            static_cast<std::uint32_t>(passes_.fill().total(to) - passes_.fill().total(from));
         return true;
     }
     [[nodiscard]] Fill next_fill(Fill from) const {
@@ -450,8 +494,9 @@ private:
     }
 
     void show() {
-        const std::int64_t start = now_ns();
         if (to_show_ == ToShow::nothing) return;
+        if (to_show_ == ToShow::filled) reconstruct();
+        const std::int64_t start = now_ns();
         if (to_show_ == ToShow::centres) passes_.show_centres(centre_, out_);
         if (to_show_ == ToShow::filled) {
             passes_.show_filled(*frame_, filled_by_centres_, out_, variance_);
@@ -461,7 +506,7 @@ private:
             passes_.show_means(sample_, stage_, filled_, out_, variance_);
             account_.standard_error = passes_.standard_error();
         }
-        costs_.record(to_show_ == ToShow::filled ? Of::fill_show : Of::show, out_.pixels.size(), now_ns() - start);
+        costs_.record(Of::show, out_.pixels.size(), now_ns() - start);
         to_show_ = ToShow::nothing;
     }
 

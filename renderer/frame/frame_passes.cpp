@@ -248,9 +248,9 @@ void FramePasses::show_one_sample(Worker& w, const Tile& t, RadianceImage& out) 
 }
 
 /// True if the tile is used for the error estimate: all tiles, or a tenth of many.
-bool FramePasses::estimates(std::uint32_t tile) const noexcept {
+bool FramePasses::estimates(std::uint32_t tile, std::size_t many) const noexcept {
     const int tx = static_cast<int>(tile) % g_buffer_.tiles_x(), ty = static_cast<int>(tile) / g_buffer_.tiles_x();
-    return tiles_.size() < kManyTiles || is_error_tile(tx, ty);
+    return tiles_.size() < many || is_error_tile(tx, ty);
 }
 
 /// The tiles of the error estimate and their neighbours.
@@ -264,7 +264,7 @@ bool FramePasses::fills_g_buffer(std::uint32_t tile) const noexcept {
 }
 
 void FramePasses::estimate_centres(const Frame& f) {
-    const auto counts = [&](std::uint32_t tile) { return estimates(tile); };
+    const auto counts = [&](std::uint32_t tile) { return estimates(tile, kManyTiles); };
     const double counted = static_cast<double>(std::count_if(tiles_.begin(), tiles_.end(), counts));
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         if (!counts(t.index)) return;
@@ -309,26 +309,33 @@ PassCount FramePasses::fill(const Frame& f, bool centres, PixelFill::Stage from,
                       g_buffer_.store(f, p, light, b.place, t.index);
                   });
     });
-    if (count.complete) fill_->take(g_buffer_, tiles_, from, to);
+    if (count.complete)
+        fill_->take(g_buffer_, tiles_, from, to);
+    else
+        fill_->set_overwritten();
     return count;
 }
 
 void FramePasses::show_filled(const Frame& f, bool centres, RadianceImage& out, std::vector<float>* variance) {
     fill_background(out);
-    reconstruct();
+    const auto counts = [&](std::uint32_t tile) { return variance != nullptr || estimates(tile, kManyFilledTiles); };
+    const auto counted = static_cast<double>(std::count_if(tiles_.begin(), tiles_.end(), counts));
+    const double each = static_cast<double>(tiles_.size()) / counted;
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         const GBufferTile& pixels = g_buffer_.tile(t.index);
         put_pixels(t, pixels.r, pixels.g, pixels.b, out);
-        TileContrast contrast;
-        if (centres) g_buffer_.contrast(f, t.index, contrast);
-        t.each_pixel([&](int x, int y, std::size_t at) {
-            const bool traced = fill_->is_traced(t.index, at);
-            const double squared =
-                centres ? (traced ? static_cast<double>(contrast.centre[at]) : fill_->error_of(t.index, at))
-                        : (traced ? kNoiseOfTraced : kNoiseOfFilled) * fill_->error_of(t.index, at);
-            w.error.add_squared(squared);
-            if (variance != nullptr) (*variance)[index_of(x, y, out.width)] = static_cast<float>(squared);
-        });
+        if (counts(t.index)) {
+            TileContrast contrast;
+            if (centres) g_buffer_.contrast(f, t.index, contrast);
+            t.each_pixel([&](int x, int y, std::size_t at) {
+                const bool traced = fill_->is_traced(t.index, at);
+                const double squared =
+                    centres ? (traced ? static_cast<double>(contrast.centre[at]) : fill_->error_of(t.index, at))
+                            : (traced ? kNoiseOfTraced : kNoiseOfFilled) * fill_->error_of(t.index, at);
+                w.error.add_squared(each * squared);
+                if (variance != nullptr) (*variance)[index_of(x, y, out.width)] = static_cast<float>(squared);
+            });
+        }
         add_subpixel_light(f, t, out, variance);
     });
 }

@@ -71,14 +71,14 @@ public:
     /// Starts an image with less than one sample per pixel (pixel_fill.h). `with_pilot`: the tiles of the pilot
     /// pass have a sample of each pixel already.
     void begin_fill(bool with_pilot);
-    void plan_fill(int stride) { fill_->plan(g_buffer_, tiles_, stride); }
+    void plan_fill(int stride, bool first) { fill_->plan(g_buffer_, tiles_, stride, first); }
     [[nodiscard]] const PixelFill& fill() const noexcept { return *fill_; }
     /// Traces the planned pixels between two stages: their centres, or the first samples of their sequences.
     PassCount fill(const Frame& f, bool centres, PixelFill::Stage from, PixelFill::Stage to,
                    const PassLimit& limit);
     /// Reconstructs the pixels without a sample.
     void reconstruct() { fill_->reconstruct(g_buffer_, tiles_); }
-    /// The same, and writes the image.
+    /// Writes the reconstructed image.
     void show_filled(const Frame& f, bool centres, RadianceImage& out, std::vector<float>* variance);
 
     /// Makes an adaptive plan from the contrasts of the centres, or a uniform plan.
@@ -119,7 +119,7 @@ private:
     void show_one_sample(Worker& w, const Tile& t, RadianceImage& out);
     void show_samples(Worker& w, const Tile& t, std::span<const std::uint8_t> chosen, RadianceImage& out,
                       std::vector<float>* variance);
-    [[nodiscard]] bool estimates(std::uint32_t tile) const noexcept;
+    [[nodiscard]] bool estimates(std::uint32_t tile, std::size_t many) const noexcept;
     [[nodiscard]] bool fills_g_buffer(std::uint32_t tile) const noexcept;
     void estimate_centres(const Frame& f);
 

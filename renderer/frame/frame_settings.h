@@ -64,7 +64,8 @@ struct FrameBudget {
 
 struct FrameAccount {
     FrameStep step = FrameStep::refined;
-    bool timed = false;         ///< the clock chose the passes
+    bool timed = false;          ///< the clock chose the passes
+    bool coarsest_late = false;  ///< even the coarsest image took longer than the time
     std::uint64_t samples = 0;  ///< camera samples of the passes that count
     std::uint64_t rays = 0;     ///< of all kinds except subpixel bodies', of the passes that count
     std::uint64_t rays_discarded = 0;

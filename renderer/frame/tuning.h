@@ -52,9 +52,9 @@ inline constexpr std::int64_t kMinSlack_ns = 300'000, kSlackPart = 40;
 
 // Prediction of a pass's wall time (pass_costs.h), runs of docking beside other load.
 
-/// ns per pixel or sample of each kind of pass before any measurement: centres, plan, samples, sunlight, show;
-/// plan and show of a filled image.
-inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10, 30, 60};
+/// ns per pixel or sample of each kind of pass before any measurement: centres, plan, samples, sunlight, show,
+/// reconstruction of a lattice.
+inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10, 30};
 /// After a skipped pass the estimate falls by this factor, to no less than this fraction of the last measurement.
 inline constexpr double kSkippedDecay = 0.95, kMinDecayed = 0.25;
 /// Weight of a new measurement, which counts as within this factor of the estimate.
@@ -71,6 +71,8 @@ inline constexpr std::uint32_t kBatchesPerClockRead = 16;
 /// With this many tiles or more, the error of a frame of centres is estimated from a tenth of them: on craft at
 /// 1024 x 1024 it then differs by 3 % from that of all tiles.
 inline constexpr std::size_t kManyTiles = 4096;
+/// The same for filled frames, which are made where time is short.
+inline constexpr std::size_t kManyFilledTiles = 1024;
 /// PathSettings::first_survival if edges cause most of the error: in frames of one sample per pixel, and if paths
 /// are traced from all samples. craft-paths.
 inline constexpr float kReducedSurvival = 0.5f;
@@ -102,10 +104,12 @@ inline constexpr float kOneSurfaceGap = 0.05f, kOneSideGap = 0.005f;
 inline constexpr float kSilhouetteContrast = 1.0f / 64;
 /// Fewer comparisons than this say nothing about an octave of contrast; then the squared error is this part of the
 /// squared contrast.
-inline constexpr double kMinComparisons = 30, kFillErrorOfContrast = 0.5;
-/// One in so many pixels is traced first, to be compared. Docking at 25 s with 0.5 to 1.5 of the rays of one sample
-/// per pixel: predicted over measured error 1.2 to 1.5, without it 1.7 to 2.2.
-inline constexpr std::uint64_t kComparedPart = 64;
+inline constexpr double kMinComparisons = 30, kFillErrorOfContrast = 0.2;
+/// In one of so many tiles, one of so many pixels is traced first, to be compared. Docking at 25 s with 0.5 to 1.5
+/// of the rays of one sample per pixel: predicted over measured error 1.2 to 1.5, without it 1.7 to 2.2.
+inline constexpr std::uint64_t kComparedTiles = 16, kComparedPlaces = 4;
+/// In small images, in at least so many tiles.
+inline constexpr std::uint64_t kMinComparedTiles = 120;
 /// Where samples are noisy, so are the neighbours with which they are compared: the squared error of a traced and
 /// of a reconstructed pixel, as parts of the mean squared difference. The
 /// craft of tests/renderer/frame, by paths.
@@ -113,11 +117,13 @@ inline constexpr double kNoiseOfTraced = 0.5, kNoiseOfFilled = 0.35;
 /// Sun-only direct lighting: this part of what is left after one pixel in 2 x 2 goes to further pixels, the rest to
 /// further samples; with this many rays per pixel, all centres are traced instead.
 inline constexpr double kSparseFill = 0.5, kAllCentresRays = 3;
+/// The plans of these samples may take this part of the time that is left. Runs of docking.
+inline constexpr double kMaxSparsePlan = 0.4;
 /// A pass is worth its start if it traces this part of a lattice.
 inline constexpr double kMinFill = 0.005;
 /// Pixels in a batch of 16 while lattices are filled, about, as a part. Time of one sample per pixel that is
 /// attempted, as a part of the time left. Runs of docking.
-inline constexpr double kFilledLanes = 0.5, kMaxFirstTime = 0.8;
+inline constexpr double kFilledLanes = 0.9, kMaxFirstTime = 0.8;
 /// Parts of the remaining time for the next pixels, and for those after them.
 inline constexpr double kFirstFillTime = 0.6, kNextFillTime = 0.85;
 /// The same of the remaining rays, where a sample may take any number of them: with

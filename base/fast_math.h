@@ -1,5 +1,5 @@
-/// base/fast_math.h - sine, cosine and powers without branches or tables, so that the compiler can vectorise them.
-/// A value is the same in a vector lane as in scalar code.
+/// base/fast_math.h - sine, cosine, logarithm and powers without branches or tables, so that the compiler can
+/// vectorise them. A value is the same in a vector lane as in scalar code.
 #pragma once
 
 #include <algorithm>
@@ -64,6 +64,25 @@ struct SinCos {
                                z * (1.0 / 24 + z * (1.0 / 120 + z * (1.0 / 720 + z * (1.0 / 5040 + z / 40320)))))));
     const double scale = std::bit_cast<double>((std::bit_cast<std::uint64_t>(shifted) + 1023) << 52);
     return log2_power > -1000 ? fraction * scale : 0;
+}
+
+/// Binary logarithm of a positive normal number, to an error below 1e-6 or 2e-7 of the value.
+[[nodiscard]] inline float log2_of(float x) noexcept {
+    constexpr std::uint32_t kRootHalf = 0x3f3504f3;
+    const auto bits = std::bit_cast<std::uint32_t>(x);
+    const std::int32_t e = static_cast<std::int32_t>(bits - kRootHalf) >> 23;
+    const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(e) << 23));
+    const float t = (m - 1) / (m + 1), u = t * t;  // |t| <= 0.1716
+    const float ln_m = 2 * t * (1 + u * (1.0f / 3 + u * (1.0f / 5 + u * (1.0f / 7 + u * (1.0f / 9)))));
+    return static_cast<float>(e) + ln_m * std::numbers::log2e_v<float>;
+}
+/// 2^y for |y| <= 125, to a relative error below 1e-6 where |y| <= 16 (rounding of y beyond).
+[[nodiscard]] inline float exp2_of(float y) noexcept {
+    constexpr float kToInteger = 0x1.8p23f;
+    const float shifted = y + kToInteger, z = (y - (shifted - kToInteger)) * std::numbers::ln2_v<float>;
+    const float fraction =
+        1 + z * (1 + z * (1.0f / 2 + z * (1.0f / 6 + z * (1.0f / 24 + z * (1.0f / 120 + z * (1.0f / 720))))));
+    return fraction * std::bit_cast<float>((std::bit_cast<std::uint32_t>(shifted) + 127) << 23);
 }
 
 }  // namespace narpa

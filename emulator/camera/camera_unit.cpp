@@ -130,7 +130,8 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     durations_.radiance_ns = t_radiance_ns_ - begun_ns;
     const std::int64_t lit_ns = t_radiance_ns_;
     // The allowance includes the time by which the renderer stopped late, unless no less could be done.
-    if (account.timed && !account.coarsest_late) t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
+    if (account.timed && !account.coarsest_late)
+        t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);
     narpa::expose(camera_, radiance_, settings.seed, frame, bytes_, sensor_array_.get());
     if (camera_.control) read_out(format(), settings_.region, settings_.binning, bytes_);
     durations_.sensor_ns = monotonic_ns() - lit_ns;

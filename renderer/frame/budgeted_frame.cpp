@@ -277,8 +277,8 @@ private:
         }
     }
     /// The first image: one pixel in 2 x 2, whose batches are full, if that is expected to fit; else one in 4 x 4.
-    /// It is completed even if it is late: a coarser one would take two thirds of its time. Returns the stride, 0 if
-    /// nothing was taken.
+    /// It is completed even if it is late: a coarser one would take two thirds of its time. Returns the stride, 0
+    /// if nothing was taken.
     int take_first_lattice(const Frame& f) {
         passes_.plan_fill(2, true);
         const bool fits = static_cast<double>(passes_.fill().total()) <= pixels_of_first_lattice();

@@ -318,7 +318,9 @@ PassCount FramePasses::fill(const Frame& f, bool centres, PixelFill::Stage from,
 
 void FramePasses::show_filled(const Frame& f, bool centres, RadianceImage& out, std::vector<float>* variance) {
     fill_background(out);
-    const auto counts = [&](std::uint32_t tile) { return variance != nullptr || estimates(tile, kManyFilledTiles); };
+    const auto counts = [&](std::uint32_t tile) {
+        return variance != nullptr || estimates(tile, kManyFilledTiles);
+    };
     const auto counted = static_cast<double>(std::count_if(tiles_.begin(), tiles_.end(), counts));
     const double each = static_cast<double>(tiles_.size()) / counted;
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {

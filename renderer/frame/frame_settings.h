@@ -66,8 +66,8 @@ struct FrameAccount {
     FrameStep step = FrameStep::refined;
     bool timed = false;          ///< the clock chose the passes
     bool coarsest_late = false;  ///< even the coarsest image took longer than the time
-    std::uint64_t samples = 0;  ///< camera samples of the passes that count
-    std::uint64_t rays = 0;     ///< of all kinds except subpixel bodies', of the passes that count
+    std::uint64_t samples = 0;   ///< camera samples of the passes that count
+    std::uint64_t rays = 0;      ///< of all kinds except subpixel bodies', of the passes that count
     std::uint64_t rays_discarded = 0;
     std::array<std::uint32_t, kMaxPasses> passes{};  ///< camera samples of each pass after the first; 0: none
     /// Root mean square over the pixels of the standard error of a pixel's mean band, W m^-2 sr^-1; negative: not

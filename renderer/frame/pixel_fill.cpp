@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "base/each_isa.h"
+#include "renderer/frame/tile_window.h"
 #include "renderer/frame/tuning.h"
 #include "renderer/integrator/sampler.h"
 
@@ -71,16 +72,6 @@ bool together(std::uint32_t surface_a, float depth_a, std::uint32_t surface_b, f
 
 // A tile with its surroundings.
 
-constexpr int kWindowBorder = 2, kWindowSide = kTile + 2 * kWindowBorder;
-constexpr int kWindowRow = 16;  ///< row stride, padded to the width of a vector
-template <class T>
-using WindowGrid = std::array<T, kWindowSide * kWindowRow>;
-
-constexpr std::size_t window_cell(int x, int y) {
-    return static_cast<std::size_t>((y + kWindowBorder) * kWindowRow + x + kWindowBorder);
-}
-constexpr std::size_t kFirstCell = window_cell(0, 0), kEndCell = window_cell(kTile - 1, kTile - 1) + 1;
-
 /// The neighbours of a pixel, those beside it first.
 constexpr std::array<std::array<int, 2>, 8> kNeighbours{
     {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
@@ -98,30 +89,21 @@ struct alignas(64) Window : WindowPlanes {
     Window(const GBuffer& from, std::uint32_t tile, int border, std::span<const std::uint64_t> known_pixels) {
         std::memset(static_cast<WindowPlanes*>(this), 0, sizeof(WindowPlanes));
         const int tx = static_cast<int>(tile) % from.tiles_x(), ty = static_cast<int>(tile) / from.tiles_x();
-        tiles[4] = &from.tile(tile);
-        for (int y = 0; y < kTile; ++y)
-            for (int x = 0; x < kTile; x += 4) put_own(*tiles[4], x, y, known_pixels[tile]);
-        for (int row = -1; row <= 1; ++row)
-            for (int column = -1; column <= 1; ++column) {
-                const int x = tx + column, y = ty + row;
-                if (x < 0 || y < 0 || x >= from.tiles_x() || y >= from.tiles_y() || (row == 0 && column == 0))
-                    continue;
-                const auto other = static_cast<std::uint32_t>(y * from.tiles_x() + x);
-                const GBufferTile* const t = from.is_traced(other) ? &from.tile(other) : nullptr;
-                tiles[static_cast<std::size_t>((row + 1) * 3 + column + 1)] = t;
-                const auto first = [&](int k) { return k < 0 ? kTile - border : 0; };
-                const auto end = [&](int k, int in_image) { return std::min(k > 0 ? border : kTile, in_image); };
-                const int x_end = end(column, from.width() - x * kTile), y_end = end(row, from.height() - y * kTile);
-                for (int py = first(row); py < y_end; ++py)
-                    for (int px = first(column); px < x_end; ++px) {
-                        const std::size_t place = place_in_tile(px, py);
-                        const std::size_t at = window_cell(px + column * kTile, py + row * kTile);
-                        if (t == nullptr)
-                            put_background(from.background(), at);
-                        else if ((known_pixels[other] >> place & 1) != 0)
-                            put(*t, place, at);
-                    }
+        for (int y = -1; y <= 1; ++y)
+            for (int x = -1; x <= 1; ++x) {
+                if (tx + x < 0 || ty + y < 0 || tx + x >= from.tiles_x() || ty + y >= from.tiles_y()) continue;
+                const auto other = static_cast<std::size_t>((ty + y) * from.tiles_x() + tx + x);
+                if (from.is_traced(other)) tiles[static_cast<std::size_t>((y + 1) * 3 + x + 1)] = &from.tile(other);
             }
+        const GBufferTile& own = from.tile(tile);
+        for (int y = 0; y < kTile; ++y)
+            for (int x = 0; x < kTile; x += 4) put_own(own, x, y, known_pixels[tile]);
+        each_pixel_beside(from, tile, border, [&](std::uint32_t other, std::size_t place, std::size_t at) {
+            if (!from.is_traced(other))
+                put_background(from.background(), at);
+            else if ((known_pixels[other] >> place & 1) != 0)
+                put(from.tile(other), place, at);
+        });
     }
     void put_background(const Rgb& radiance, std::size_t at) {
         r[at] = radiance.x, g[at] = radiance.y, b[at] = radiance.z;
@@ -153,8 +135,8 @@ struct alignas(64) Window : WindowPlanes {
 
 /// What the known neighbours of each pixel show.
 struct alignas(64) Surroundings {
-    WindowGrid<float> r, g, b;          ///< weighted means
-    WindowGrid<float> contrast;         ///< largest difference of mean bands
+    WindowGrid<float> r, g, b;           ///< weighted means
+    WindowGrid<float> contrast;          ///< largest difference of mean bands
     WindowGrid<std::uint32_t> one_side;  ///< 1: no silhouette passes between them, as in most pixels
 };
 
@@ -532,7 +514,8 @@ void PixelFill::find_errors() noexcept {
         error = {kFillErrorOfContrast, 0};
         for (const Comparison& c : {compared_.first[octave], with_others, coarser}) {
             if (c.pixels < kMinComparisons) continue;
-            error = c.contrasts > 0 ? OctaveError{c.squares / c.contrasts, 0} : OctaveError{0, c.squares / c.pixels};
+            error =
+                c.contrasts > 0 ? OctaveError{c.squares / c.contrasts, 0} : OctaveError{0, c.squares / c.pixels};
             break;
         }
     }

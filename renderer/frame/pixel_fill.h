@@ -136,7 +136,7 @@ private:
     int stride_ = 2;              ///< of the last plan
     bool has_contrasts_ = false;  ///< a lattice was planned by contrast
     bool overwritten_ = false;
-    float most_ = 1;              ///< the frame's largest contrast
+    float most_ = 1;  ///< the frame's largest contrast
 };
 
 }  // namespace narpa

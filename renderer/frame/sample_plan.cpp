@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/each_isa.h"
+#include "base/fast_math.h"
+#include "renderer/frame/tile_window.h"
 #include "renderer/frame/tuning.h"
 #include "renderer/integrator/sampler.h"
 
@@ -14,76 +17,69 @@ namespace {
 
 using namespace tuning;
 
-constexpr int kRim = 2;
-constexpr int kPlanSide = kTile + 2 * kRim;
-using PlanGrid = std::array<std::array<float, kPlanSide>, kPlanSide>;
 constexpr std::size_t kGrain = 16;  ///< tiles per task
 
-/// Folds 2 r + 1 neighbours.
-template <class Value, class Fold>
-float fold(int r, Value&& value, Fold&& with) {
-    float sum = value(-r);
-    for (int k = 1 - r; k <= r; ++k) sum = with(sum, value(k));
-    return sum;
-}
-constexpr auto kGreatest = [](float a, float b) { return std::max(a, b); };
-constexpr auto kSum = [](float a, float b) { return a + b; };
-
 /// Contrasts of a tile's pixels and their neighbours up to two pixels away.
-struct Neighbourhood {
-    PlanGrid edge{};            ///< variance
-    PlanGrid noise{}, known{};  ///< variance; 1 where it is known
+struct alignas(64) Neighbourhood {
+    WindowGrid<float> edge{};            ///< variance
+    WindowGrid<float> noise{}, known{};  ///< variance; 1 where it is known
+
+    void put(const TileContrast& c, std::size_t place, float unseen, std::size_t at) {
+        edge[at] = c.edge[place] + unseen * c.breaks[place];
+        known[at] = c.noise[place] >= 0 ? 1.0f : 0.0f;
+        noise[at] = std::max(c.noise[place], 0.0f);
+    }
 };
 
-Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& contrasts, int tx, int ty,
+Neighbourhood gather(const GBuffer& g_buffer, const std::vector<TileContrast>& contrasts, std::uint32_t tile,
                      float unseen) {
     Neighbourhood n;
-    for (int y = 0; y < kPlanSide; ++y)
-        for (int x = 0; x < kPlanSide; ++x) {
-            const int px = tx * kTile + x - kRim, py = ty * kTile + y - kRim;
-            if (px < 0 || py < 0 || px >= g_buffer.width() || py >= g_buffer.height()) continue;
-            const auto tile = static_cast<std::size_t>(py / kTile * g_buffer.tiles_x() + px / kTile);
-            if (!g_buffer.is_traced(tile)) continue;
-            const std::size_t place = place_in_tile(px % kTile, py % kTile);
-            const TileContrast& c = contrasts[tile];
-            n.edge[y][x] = c.edge[place] + unseen * c.breaks[place];
-            n.known[y][x] = c.noise[place] >= 0 ? 1.0f : 0.0f;
-            n.noise[y][x] = std::max(c.noise[place], 0.0f);
-        }
+    each_pixel_in_window(g_buffer, tile, kWindowBorder,
+                         [&](std::uint32_t other, std::size_t place, std::size_t at) {
+                             if (g_buffer.is_traced(other)) n.put(contrasts[other], place, unseen, at);
+                         });
     return n;
 }
 
+/// How much of an edge's variance pixels beside it get, and two pixels away.
+struct EdgeClasses {
+    float beside = 0, two_away = 0;
+};
+
 /// Variance of one sample of each pixel, relative to a typical one; 0 if its surroundings are uniform.
-PerPixel<double> relative_variances(const Neighbourhood& n, double typical, bool edge_classes) {
-    PlanGrid near{}, far{}, noises{}, knowns{};  // folded along the rows, then along the columns
-    for (int y = 0; y < kPlanSide; ++y)
-        for (int x = kRim; x < kPlanSide - kRim; ++x) {
-            const auto row = [&](const PlanGrid& g) { return [&g, x, y](int k) { return g[y][x + k]; }; };
-            near[y][x] = fold(1, row(n.edge), kGreatest);
-            far[y][x] = fold(2, row(n.edge), kGreatest);
-            noises[y][x] = fold(2, row(n.noise), kSum);
-            knowns[y][x] = fold(2, row(n.known), kSum);
-        }
-    PerPixel<double> variances{};
-    for (int y = kRim; y < kPlanSide - kRim; ++y)
-        for (int x = kRim; x < kPlanSide - kRim; ++x) {
-            const auto column = [&](const PlanGrid& g) { return [&g, x, y](int k) { return g[y + k][x]; }; };
-            // Excluded below: the noise values that contain the pixel's own centre, those of the pixel and its four
-            // neighbours.
-            const auto cross = [&](const PlanGrid& g) {
-                return g[y][x] + g[y][x - 1] + g[y][x + 1] + g[y - 1][x] + g[y + 1][x];
-            };
-            float edge = n.edge[y][x];
-            if (edge_classes)
-                edge = std::max({edge, kVarianceBesideEdge * fold(1, column(near), kGreatest),
-                                 kVarianceTwoFromEdge * fold(2, column(far), kGreatest)});
-            const float neighbours = fold(2, column(knowns), kSum) - cross(n.known);
-            const float noise =
-                neighbours > 0 ? std::max(fold(2, column(noises), kSum) - cross(n.noise), 0.0f) / neighbours : 0.0f;
-            variances[place_in_tile(x - kRim, y - kRim)] =
-                std::pow(static_cast<double>(edge) / typical, kEdgePower) + static_cast<double>(noise) / typical;
-        }
-    return variances;
+NARPA_EACH_ISA void relative_variances(const Neighbourhood& n, float typical, const EdgeClasses& classes,
+                                       WindowGrid<float>& variances) noexcept {
+    constexpr std::size_t kDown = kWindowRow, kFirst = 2, kEnd = WindowGrid<float>{}.size() - 2;
+    const auto most = [](float a, float b) { return a > b ? a : b; };
+    WindowGrid<float> near{}, far{}, noises{}, knowns{}, out{};  // folded along the rows, then along the columns
+    for (std::size_t at = kFirst; at < kEnd; ++at) {
+        near[at] = most(most(n.edge[at - 1], n.edge[at]), n.edge[at + 1]);
+        far[at] = most(most(n.edge[at - 2], near[at]), n.edge[at + 2]);
+        noises[at] = n.noise[at - 2] + n.noise[at - 1] + n.noise[at] + n.noise[at + 1] + n.noise[at + 2];
+        knowns[at] = n.known[at - 2] + n.known[at - 1] + n.known[at] + n.known[at + 1] + n.known[at + 2];
+    }
+    const auto sum_down = [](const WindowGrid<float>& g, std::size_t at) {
+        return g[at - 2 * kDown] + g[at - kDown] + g[at] + g[at + kDown] + g[at + 2 * kDown];
+    };
+    // Excluded below: the noise values that contain the pixel's own centre, those of the pixel and its four
+    // neighbours.
+    const auto cross = [](const WindowGrid<float>& g, std::size_t at) {
+        return g[at] + g[at - 1] + g[at + 1] + g[at - kDown] + g[at + kDown];
+    };
+    const float scale = 1 / typical;
+    constexpr float kLeast = 1e-30f;
+    for (std::size_t at = kFirstCell; at < kEndCell; ++at) {
+        const float beside = most(most(near[at - kDown], near[at]), near[at + kDown]);
+        const float two_away = most(most(most(far[at - 2 * kDown], far[at - kDown]), far[at]),
+                                    most(far[at + kDown], far[at + 2 * kDown]));
+        const float edge = most(n.edge[at], most(classes.beside * beside, classes.two_away * two_away));
+        const float neighbours = sum_down(knowns, at) - cross(n.known, at);
+        const float sum = most(sum_down(noises, at) - cross(n.noise, at), 0);
+        const float noise = neighbours > 0 ? sum / most(neighbours, 1) : 0;
+        const float of_edge = exp2_of(kEdgePower * log2_of(most(edge * scale, kLeast)));
+        out[at] = (edge > 0 ? of_edge : 0) + noise * scale;
+    }
+    variances = out;
 }
 
 template <class Do>
@@ -103,7 +99,13 @@ int rank_of(int tx, int ty) {
 
 }  // namespace
 
-SamplePlan::SamplePlan(std::size_t tiles) : contrasts_(tiles), weights_(tiles), sums_(tiles), ranks_(tiles) {}
+SamplePlan::SamplePlan(std::size_t tiles)
+    : contrasts_(tiles), weights_(tiles), sums_(tiles), dither_(tiles), ranks_(tiles) {
+    for (std::size_t tile = 0; tile < tiles; ++tile)
+        for (std::size_t place = 0; place < kTilePixels; ++place)
+            dither_[tile][place] =
+                static_cast<std::uint8_t>(sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling);
+}
 
 void SamplePlan::make_adaptive(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
     uniform_ = false;
@@ -142,27 +144,30 @@ void SamplePlan::contrast_tile(const Frame& f, const GBuffer& g_buffer, std::siz
     sums_[tile] = sums;
 }
 
-void SamplePlan::set_weights(const Frame& f, const GBuffer& g_buffer, std::size_t tile, double typical_variance,
+void SamplePlan::set_weights(const Frame& f, const GBuffer& g_buffer, std::uint32_t tile, double typical_variance,
                              Histogram& histogram) noexcept {
     const int tx = static_cast<int>(tile) % g_buffer.tiles_x(), ty = static_cast<int>(tile) / g_buffer.tiles_x();
-    const float unseen = kHiddenVariance / 12 * static_cast<float>(typical_variance);
-    const PerPixel<double> variances = relative_variances(gather(g_buffer, contrasts_, tx, ty, unseen),
-                                                          typical_variance, f.settings.mechanisms.edge_classes);
+    const float typical = std::max(static_cast<float>(typical_variance), 1e-30f);
+    const float unseen = kHiddenVariance / 12 * typical;
+    EdgeClasses classes;
+    if (f.settings.mechanisms.edge_classes) classes = {kVarianceBesideEdge, kVarianceTwoFromEdge};
+    WindowGrid<float> variances;
+    relative_variances(gather(g_buffer, contrasts_, tile, unseen), typical, classes, variances);
+    constexpr int kEmpty = kMinNonUniformWeight + kEmptyDoublings * kPerDoubling;
+    const float min_variance = kMinWeight * kMinWeight;
+    const PerPixel<std::uint32_t>& surface = g_buffer.tile(tile).surface;
     for (int y = 0; y < kTile; ++y)
         for (int x = 0; x < kTile; ++x) {
             const std::size_t place = place_in_tile(x, y);
             Weight& out = weights_[tile][place];
             out = -1;
             if (tx * kTile + x >= g_buffer.width() || ty * kTile + y >= g_buffer.height()) continue;
-            const double variance = variances[place];
-            const double doublings = std::log2(std::max(std::sqrt(variance), kMinWeight) / kMinWeight);
+            const float variance = variances[window_cell(x, y)];
+            const float doublings = 0.5f * log2_of(std::max(variance, min_variance) / min_variance);
             const int of_variance =
                 variance > 0 ? kMinNonUniformWeight + static_cast<int>(kPerDoubling * doublings) : 0;
-            const bool empty = g_buffer.tile(tile).surface[place] == 0;
-            const int weight =
-                std::max(of_variance, empty ? kMinNonUniformWeight + kEmptyDoublings * kPerDoubling : 0);
-            const auto hash = static_cast<int>(sampler_detail::mix(tile * kTilePixels + place) % kPerDoubling);
-            out = static_cast<Weight>(std::min(weight + hash, kWeights - 1));
+            const int weight = std::max(of_variance, surface[place] == 0 ? kEmpty : 0);
+            out = static_cast<Weight>(std::min(weight + dither_[tile][place], kWeights - 1));
             ++histogram[static_cast<std::size_t>(out)];
         }
 }

@@ -107,14 +107,15 @@ private:
     }
     void contrast_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile) noexcept;
     using Histogram = std::array<std::uint32_t, kWeights>;  ///< pixels of each weight
-    void set_weights(const Frame& f, const GBuffer& g_buffer, std::size_t tile, double typical_variance,
+    void set_weights(const Frame& f, const GBuffer& g_buffer, std::uint32_t tile, double typical_variance,
                      Histogram& histogram) noexcept;
 
     bool uniform_ = false;
     bool all_by_paths_ = false;  ///< uniform: every sample has a path; else as paths_of()
     std::vector<TileContrast> contrasts_;
     std::vector<PerPixel<Weight>> weights_;
-    std::vector<Sums> sums_;  ///< of each tile
+    std::vector<Sums> sums_;                      ///< of each tile
+    std::vector<PerPixel<std::uint8_t>> dither_;  ///< added to the weights: a hash of the pixel
     std::array<std::atomic<std::uint32_t>, kWeights> histogram_{};
     std::vector<std::uint8_t> ranks_;                     ///< uniform: rank of each tile in the pattern
     std::array<std::uint64_t, kRanks> pixels_of_rank_{};  ///< in the tiles of the plan

@@ -84,7 +84,7 @@ inline constexpr float kReducedSurvival = 0.5f;
 inline constexpr float kVarianceBesideEdge = 0.05f, kVarianceTwoFromEdge = 0.01f;
 /// Smallest weight of a pixel that differs from its neighbours, relative to a typical edge's. Pixels in completely
 /// uniform regions, such as empty space, get an eighth of it.
-inline constexpr double kMinWeight = 1.0 / 128;
+inline constexpr float kMinWeight = 1.0f / 128;
 /// A pixel whose centre hit nothing gets kMinWeight times two to this power: a body's bounds are in view, so thin
 /// parts may pass between the centres, and a search costs one ray and no shading.
 inline constexpr int kEmptyDoublings = 2;
@@ -92,7 +92,7 @@ inline constexpr int kEmptyDoublings = 2;
 inline constexpr float kHiddenVariance = 0.02f;
 /// Exponent of the variance of edges, which falls as n^-1.5, beside that of noise, which falls as 1/n: the weights
 /// are the powers 2/5 and 1/2 of the variances of one sample.
-inline constexpr double kEdgePower = 0.8;
+inline constexpr float kEdgePower = 0.8f;
 
 // Pixels that are not traced (pixel_fill.h). Where a constant names no scene, it was chosen once and not varied;
 // the results were measured on docking at 25 and 50 s and on craft.

@@ -167,7 +167,7 @@ template <int kStride>
         around.r[at] = each * r, around.g[at] = each * g, around.b[at] = each * b;
         around.contrast[at] = high - low;
         const bool flat = farthest - nearest <= kOneSurfaceGap * nearest;
-        around.one_side[at] = (least == most) & flat ? 1 : 0;
+        around.one_side[at] = least == most && flat ? 1 : 0;
     }
     out = around;
 }

@@ -42,6 +42,7 @@ json to_json(const CameraRun& c) {
                 {"sensor_ms", percentiles(c.stats.sensor, 1e-6)},
                 {"send_ms", percentiles(c.stats.send, 1e-6)}});
     for (const auto& [name, p] : kPercentiles) out["allowance_used"][name] = c.allowance_used(p);
+    if (!c.flown.empty()) out["by_range"] = by_range(c.flown);
     return out;
 }
 
@@ -106,12 +107,20 @@ Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunO
     // Forks before the run allocates its memory: copy-on-write would make its pages fault once more.
     auto competing = CompetingLoad::start(load);
     if (!competing) return competing.error();
-    auto emulator = Emulator::create(scene, options);
+    RunOptions watched = options;
+    std::vector<std::shared_ptr<Flown>> flown;
+    if (!options.bus.empty())
+        for (std::size_t camera = 0; camera < scene.cameras.size(); ++camera) {
+            flown.push_back(std::make_shared<Flown>());
+            watched.observers.push_back(watch_flight(camera, flown.back()));
+        }
+    auto emulator = Emulator::create(scene, watched);
     if (!emulator) return emulator.error();
     if (auto done = (*emulator)->run(stop); !done) return done.error();
 
     LoopRun run{name, load, {}, {}, (*emulator)->page_faults(), (*emulator)->notices()};
     for (const CameraSensor* camera : (*emulator)->cameras()) run.cameras.push_back(of(*camera, scene.render));
+    for (std::size_t camera = 0; camera < flown.size(); ++camera) run.cameras[camera].flown = *flown[camera];
     for (const LidarSensor* lidar : (*emulator)->lidars())
         run.lidars.push_back({std::string(lidar->name()), lidar->stats(), lidar->report()});
     return run;
@@ -161,6 +170,7 @@ std::string to_text(const std::vector<LoopRun>& runs) {
                             ms(s.render), ms(s.hand_over), ms(s.late), 100 * c.allowance_used(0.5));
             out += fmt::format("{:>7} {:>8} {}\n", "", "", frames_text(s));
             out += fmt::format("{:>7} {:>8} handed over: {}\n", run.name, c.name, lateness_text(s.late));
+            if (!c.flown.empty()) out += by_range_text(c.flown);
         }
         for (const LidarRun& l : run.lidars)
             out += fmt::format("{:>7} {:>8} {:>7} {:>5} {:>5} {:>5} {:>22} {:>24} {:>24}\n", run.name, l.name,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/flight.h"
 #include "emulator/camera/camera_sensor.h"
 #include "emulator/emulator.h"
 #include "emulator/lidar/lidar_sensor.h"
@@ -35,6 +36,7 @@ struct CameraRun {
     std::int64_t allowance_ns = 0;  ///< from the end of the exposure to the deadline of the hand-over
     CameraStats stats;
     nlohmann::json report{};  ///< CameraSensor::report
+    Flown flown{};            ///< its frames, in a flight
 
     /// Frames without a whole image; there must be none.
     [[nodiscard]] std::uint64_t incomplete() const noexcept {
@@ -61,7 +63,8 @@ struct LoopRun {
     std::vector<std::string> notices;
 };
 
-/// Runs the loop once, for `options.duration_s`, beside load on these processors (none: alone).
+/// Runs the loop once, for `options.duration_s`, beside load on these processors (none: alone). With a bus, it is a
+/// flight: frames are kept by range.
 [[nodiscard]] Result<LoopRun> run_loop(const std::string& name, const Scene& scene, const RunOptions& options,
                                        const std::vector<int>& load, const StopFlag& stop);
 

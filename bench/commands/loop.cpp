@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "apps/scene_options.h"
 #include "bench/commands/commands.h"
 #include "bench/commands/scene.h"
+#include "bench/flight.h"
 #include "bench/loop.h"
 #include "emulator/realtime.h"
 
@@ -16,7 +18,8 @@ namespace {
 constexpr int kCpusMax = 1024;
 
 struct LoopBenchOptions {
-    std::string scene, cpus, plot;
+    std::string scene, cpus, plot, trajectory;
+    std::optional<double> duration_s;
     std::vector<int> load;
     int busy = 0;  ///< processors to keep busy, where `load` does not name them
     bool idle_only = false;
@@ -59,6 +62,20 @@ Result<std::vector<LoopRun>> measure(const LoopBenchOptions& o, const Scene& sce
     return runs;
 }
 
+/// The trajectory there and back, and its length as duration unless one is set.
+Result<std::optional<RecordedFlight>> prepare_flight(LoopBenchOptions& o, const Scene& scene) {
+    if (o.duration_s) o.run.duration_s = *o.duration_s;
+    if (o.trajectory.empty()) return std::optional<RecordedFlight>{};
+    auto rows = read_trajectory(o.trajectory);
+    if (!rows) return rows.error();
+    const std::vector<TrajectoryRow> flown = there_and_back(*std::move(rows));
+    if (!o.duration_s) o.run.duration_s = std::max(1.0, static_cast<double>(flown.back().t_ns) * 1e-9);
+    auto flight = RecordedFlight::create(scene, o.trajectory, flown);
+    if (!flight) return flight.error();
+    o.run.bus = flight->bus();
+    return std::optional<RecordedFlight>(*std::move(flight));
+}
+
 Outcome bench_loop(LoopBenchOptions o) {
     stop_on_signals();
     if (auto good = choose_load(o); !good) return good.error();
@@ -73,6 +90,8 @@ Outcome bench_loop(LoopBenchOptions o) {
     if (!scene) return scene.error();
     if (scene->cameras.empty()) return Error{"has no camera, expected one at least", scene->file};
     o.budget.override_scene(scene->render);
+    auto flight = prepare_flight(o, *scene);
+    if (!flight) return flight.error();
 
     auto runs = measure(o, *scene);
     if (!runs) return runs.error();
@@ -109,10 +128,13 @@ Command add_bench_loop(Parser bench_command) {
     const Parser c = bench_command.subcommand(
         "loop", "The real-time loop, alone and under load from other processes: jitter, latency, deadlines");
     c.option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that is installed with narpa)");
-    c.option("--duration,--seconds", o->run.duration_s, "Seconds of each of the two runs")
+    c.option("--duration,--seconds", o->duration_s,
+             "Seconds of each of the two runs (default: 10, or the flight of --trajectory)")
         .type_name("SECONDS")
-        .range(0.1, 86400.0)
-        .shows_default();
+        .range(0.1, 86400.0);
+    c.option("--trajectory", o->trajectory,
+             "Fly these poses there and back, and list the frames by range (CSV, as for narpa fly)")
+        .type_name("FILE.csv");
     const Option load = c.option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)")
                             .type_name("LIST")
                             .comma_separated();

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "bench/flight.h"
 #include "bench/loop.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
@@ -181,6 +182,65 @@ TEST(LoopRun, FaultsAreSentences) {
     none.cameras.emplace_back().name = "nav";
     EXPECT_EQ(loop_faults({none}, 1),
               std::vector<std::string>{"idle, camera nav: no frame fell due, expected one at least"});
+}
+
+TrajectoryRow row(std::int64_t t_ns, double x_m, double speed_m_s) {
+    TrajectoryRow r{t_ns, "chaser", {}, 1};
+    r.motion.T_world_body.t = {x_m, 0, 0};
+    r.motion.velocity_m_s = {speed_m_s, 0, 0};
+    r.motion.rate_rad_s = {0, 0, 0.1};
+    return r;
+}
+
+TEST(Flight, ReturnsTheWayItCame) {
+    const auto rows =
+        there_and_back({row(7'000'000'000, 10, 0), row(5'000'000'000, 60, -2), row(6'000'000'000, 30, -1)});
+    const std::vector<std::pair<double, double>> expected{{60, -2}, {30, -1}, {10, 0}, {30, 1}, {60, 2}};
+    ASSERT_EQ(rows.size(), expected.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        EXPECT_EQ(rows[i].t_ns, static_cast<std::int64_t>(i) * 1'000'000'000);
+        EXPECT_EQ(rows[i].motion.T_world_body.t.x, expected[i].first);
+        EXPECT_EQ(rows[i].motion.velocity_m_s.x, expected[i].second);
+        EXPECT_EQ(rows[i].motion.rate_rad_s.z, i < 3 ? 0.1 : -0.1);
+    }
+    EXPECT_TRUE(there_and_back({}).empty());
+}
+
+TEST(Flight, ListsFramesByRange) {
+    const Flown frames{{9, false, 0, 20, 1, 0.01}, {15.9, true, 3, 30, 0.5, 0.03}, {16, false, 4, 40, 0.1, -1}};
+    const nlohmann::json ranges = by_range(frames);
+    ASSERT_EQ(ranges.size(), 2u);
+    EXPECT_EQ(ranges[0]["from_m"], 16);
+    EXPECT_TRUE(ranges[0]["expected_error"].is_null());
+    EXPECT_EQ(ranges[1]["to_m"], 16);
+    EXPECT_EQ(ranges[1]["frames"], 2);
+    EXPECT_EQ(ranges[1]["late"], 1);
+    EXPECT_EQ(ranges[1]["steps"], nlohmann::json::parse(R"({"refined": 1, "coarse_2": 1})"));
+    EXPECT_EQ(ranges[1]["mid_exposure_to_hand_over_ms"]["max"], 30);
+    EXPECT_EQ(ranges[1]["expected_error"]["max"], 0.03);
+}
+
+TEST(BenchLoop, FliesATrajectoryAndRefusesOneOfAnotherScene) {
+    const test::TemporaryFolder folder;
+    const std::string header(kTrajectoryHeader);
+    const auto write = [&](const char* name, const std::string& body) {
+        std::ofstream(folder / name) << header << "\n0," << body << ",60,3.2,-2.1,0,0,0,1,-2,0,0,0,0,0\n0.5,"
+                                     << body << ",59,3.2,-2.1,0,0,0,1,-2,0,0,0,0,0\n";
+        return " --trajectory " + (folder / name);
+    };
+    const Done done = bench("--idle-only --json" + write("flight.csv", "chaser"), " 2>/dev/null");
+    const auto document = nlohmann::json::parse(done.out);
+    SCOPED_TRACE(document.dump(2));
+    EXPECT_EQ(document["duration_s"], 1);  // there and back
+    const auto& ranges = document["runs"][0]["cameras"][0]["by_range"];
+    ASSERT_EQ(ranges.size(), 1u);
+    EXPECT_EQ(ranges[0]["from_m"], 32);
+    EXPECT_GE(ranges[0]["frames"], 1);
+
+    const Done refused = bench("--idle-only" + write("other.csv", "probe"), " 2>&1");
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_NE(refused.out.find("other.csv:2"), std::string::npos) << refused.out;
+    EXPECT_NE(refused.out.find("\"probe\""), std::string::npos) << refused.out;
 }
 
 }  // namespace

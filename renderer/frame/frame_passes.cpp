@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 
@@ -18,6 +19,9 @@ using namespace tuning;
 
 /// Sums are formed per chunk, so that they do not depend on the threads.
 constexpr std::size_t kChunk = kTilesPerTask;
+
+/// So many centres of a tile are traced together with those of the next ones.
+constexpr int kFewCentres = 8;
 
 /// Finds tiles that may show light although no body is in view: the Sun's disc, area lights, a non-uniform
 /// background, a medium.
@@ -95,6 +99,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
             if (stop.load(std::memory_order_relaxed)) break;
             work(w, tile(tiles_[i]));
         }
+        w.flush();
         const PassCount& count = counts_[chunk] = w.count();
         if (rays.fetch_add(count.rays, std::memory_order_relaxed) + count.rays > limit.rays)
             stop.store(true, std::memory_order_relaxed);
@@ -301,6 +306,8 @@ PassCount FramePasses::fill(const Frame& f, bool centres, PixelFill::Stage from,
     const PassCount count = over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         const std::uint64_t places = fill_->between(t.index, from, to);
         if (places == 0) return;
+        if (centres && std::popcount(places) <= kFewCentres)
+            return w.gather_centres(t, camera_.width, places, g_buffer_);
         if (centres) return w.centres(t, camera_.width, places, g_buffer_);
         const auto none = [](std::size_t) { return 0u; };
         const auto one = [places](std::size_t at) { return static_cast<std::uint32_t>(places >> at & 1); };

@@ -82,6 +82,10 @@ NARPA_EACH_ISA void store_surfaces(const TracedRays& p, const Vec3& axis, std::u
     out = seen;
 }
 
+void store_surfaces(const Frame& f, const TracedRays& p, LaneSurfaces& out) noexcept {
+    store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.parts == LightParts::direct ? p.lit : 0, out);
+}
+
 }  // namespace
 
 bool GBuffer::shows_background(const Frame& f, const TracedRays& p, const BatchRadiance& light) const noexcept {
@@ -95,16 +99,29 @@ void GBuffer::store(const Frame& f, const TracedRays& p, const BatchRadiance& li
                     const Lanes<std::uint8_t>& place, std::size_t tile_index) noexcept {
     GBufferTile& tile = tiles_[tile_index];
     if (!shows_background(f, p, light)) known_[tile_index] = Known::something;
-    LaneSurfaces seen;
-    if (p.hits.met != 0)
-        store_surfaces(p, f.T_world_camera.q * Vec3{0, 0, 1}, f.parts == LightParts::direct ? p.lit : 0, seen);
-    else
-        seen = {};
+    LaneSurfaces seen{};
+    if (p.hits.met != 0) store_surfaces(f, p, seen);
     const auto put = [&](const auto& from, auto& to) { put_in_tile(from, place, p.rays.n, to); };
     put_in_tile(f, light, place, p.rays.n, tile.r, tile.g, tile.b);
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
     if (f.parts != LightParts::direct) put(p.variance, tile.reused);
+}
+
+void GBuffer::store(const Frame& f, const TracedRays& p, const BatchRadiance& light,
+                    const Lanes<std::uint8_t>& place, const Lanes<std::uint32_t>& tile) noexcept {
+    LaneSurfaces seen{};
+    if (p.hits.met != 0) store_surfaces(f, p, seen);
+    for (std::size_t i = 0; i < p.rays.n; ++i) {
+        GBufferTile& t = tiles_[tile[i]];
+        const std::size_t at = place[i];
+        const Rgb radiance = light.total(f.parts, i);
+        t.r[at] = radiance.x, t.g[at] = radiance.y, t.b[at] = radiance.z;
+        t.nx[at] = seen.nx[i], t.ny[at] = seen.ny[i], t.nz[at] = seen.nz[i];
+        t.depth_m[at] = seen.depth_m[i], t.surface[at] = seen.surface[i];
+        if (f.parts != LightParts::direct) t.reused[at] = p.variance[i];
+        if (seen.surface[i] != 0 || radiance != background_) known_[tile[i]] = Known::something;
+    }
 }
 
 namespace {

@@ -118,6 +118,10 @@ public:
     void store(const Frame& f, const TracedRays& p, const BatchRadiance& light, const Lanes<std::uint8_t>& place,
                std::size_t tile) noexcept;
 
+    /// The same for pixels of several tiles.
+    void store(const Frame& f, const TracedRays& p, const BatchRadiance& light, const Lanes<std::uint8_t>& place,
+               const Lanes<std::uint32_t>& tile) noexcept;
+
     /// Computes contrasts from a tile and its neighbours.
     void contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
 

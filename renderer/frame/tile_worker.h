@@ -2,6 +2,7 @@
 /// to accumulated samples. Used only by frame_passes.cpp.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
@@ -114,7 +115,7 @@ public:
     /// Traces the centres of pixels: a bit of `places` for each place in the tile.
     template <class Accumulate>
     void centres(const Tile& tile, int width, std::uint64_t places, Accumulate&& accumulate) {
-        const std::uint32_t first = f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstCentre;
+        const std::uint32_t first = first_centre();
         const auto place = [&](auto&& add, auto&& add_block) {
             if (places == kAllPlaces && tile.whole()) {
                 for (int block = 0; block < 4; ++block)
@@ -134,7 +135,39 @@ public:
         });
     }
 
+    /// Traces the centres of a few pixels of a tile, stored in the G-buffer, together with those of the next tiles:
+    /// a batch takes the same time whether it is full or not. `flush` traces those that are left.
+    void gather_centres(const Tile& tile, int width, std::uint64_t places, GBuffer& g_buffer) {
+        if (!std::ranges::equal(tile.bodies, gathered_bodies_)) flush();
+        gathered_bodies_ = tile.bodies;
+        gathered_for_ = &g_buffer;
+        tile.each_pixel([&](int x, int y, std::size_t at) {
+            if ((places >> at & 1) == 0) return;
+            gathered_tile_[gathered_.samples.n] = tile.index;
+            gathered_.add(x, y, at, first_centre() + static_cast<std::uint32_t>(y * width + x), 0);
+            if (gathered_.samples.n == kLanes) flush();
+        });
+    }
+    void flush() {
+        SampleBatch& b = gathered_;
+        if (stop_.load(std::memory_order_relaxed)) b.samples.n = 0;
+        if (b.samples.n == 0) return;
+        std::array<BatchRadiance, 1> light;
+        TracedRays& p = traced_[0];
+        b.samples.centre = true;
+        aim_rays(f, b.samples, p);
+        find_first_hits(f, gathered_bodies_, p);
+        choose_parts(b, p);
+        f.integrator.radiance(f.transport, traced_.first(1), light);
+        gathered_for_->store(f, p, light[0], b.place, gathered_tile_);
+        count_batch(b, p);
+        b.samples.n = 0;
+    }
+
 private:
+    [[nodiscard]] std::uint32_t first_centre() const {
+        return f.settings.budget.kind == FrameBudget::Kind::samples ? 0 : kFirstCentre;
+    }
     /// A range of a pixel's sample sequence.
     struct PixelRange {
         static constexpr std::uint32_t kAll = ~0u;
@@ -226,6 +259,11 @@ private:
     std::size_t full_ = 0;  ///< number of full batches
     PassCount count_;
     std::uint32_t shaded_ = 0;  ///< number of batches shaded so far
+
+    SampleBatch gathered_;
+    Lanes<std::uint32_t> gathered_tile_;  ///< of each sample
+    std::span<const std::uint32_t> gathered_bodies_;
+    GBuffer* gathered_for_ = nullptr;
 };
 
 // From a tile's samples to the image.

@@ -23,8 +23,9 @@ constexpr double kMaxSamples = 4e9;
 
 /// A frame begins with one sample per pixel, or with fewer and a reconstruction (pixel_fill.h) if not all fit.
 /// Sun-only direct lighting traces the pixel centres, plans from them, and discards them where there are samples;
-/// all other lighting takes the first sample of each pixel's sequence and keeps it. Where direct sunlight is
-/// separate, further samples of it are planned from centres that are then discarded.
+/// so does all other lighting if only few samples per pixel fit, because edges then cause most of the error. If
+/// more fit, it takes the first sample of each pixel's sequence and keeps it. Where direct sunlight is separate,
+/// further samples of it are planned from centres that are then discarded.
 class BudgetFrame {
 public:
     BudgetFrame(FramePasses& passes, PassCosts& costs, const RenderScene& render_scene, const Camera& camera,
@@ -35,11 +36,11 @@ public:
           budget_(settings.budget),
           start_ns_(now_ns()),
           slack_ns_(std::max(kMinSlack_ns, (budget_.deadline_ns - start_ns_) / kSlackPart)),
+          settings_(settings),
           centre_settings_(by_direct_light(with_spp(settings, kCentreFootprint_spp))),
           sample_settings_(with_spp(settings, kSampleFootprint_spp)),
           centre_(make_frame(render_scene, at, camera, pose, centre_settings_)),
           sample_(make_frame(render_scene, at, camera, pose, sample_settings_)),
-          has_indirect_(settings.method == RenderSettings::Method::path),
           adaptive_(sample_.parts == LightParts::direct && settings.mechanisms.sample_plan),
           separate_sunlight_(sample_.parts == LightParts::both && settings.mechanisms.sample_plan),
           out_(out),
@@ -108,14 +109,19 @@ private:
             account_.rays_discarded += lost;
             return false;
         }
-        if (instead) {
-            account_.rays_discarded += account_.rays;
-            account_.rays = account_.samples = 0;
-        }
+        if (instead) discard();
         rays_ += pass.rays;
         account_.rays += pass.rays;
         account_.samples += pass.samples;
         return true;
+    }
+
+    /// The previous passes do not count.
+    void discard() {
+        account_.rays_discarded += account_.rays;
+        account_.rays = account_.samples = 0;
+        account_.passes = {};
+        fills_ = 0;
     }
 
     /// The visible tiles and the G-buffer belong to one kind of frame.
@@ -211,18 +217,18 @@ private:
         }
     }
 
-    /// Takes one sample per pixel if that is expected to fit well; a tenth of the time left is kept for a coarser
-    /// image in case it takes much longer.
+    /// Takes one sample per pixel if that is expected to fit well, of paths if a few are; a tenth of the time left
+    /// is kept for a coarser image in case it takes much longer.
     bool take_if_affordable() {
         const std::int64_t left = ns_left();
-        const double expected = static_cast<double>(costs_.expected_ns(cost_of_one(), passes_.pixels()));
-        if (!costs_.known(cost_of_one()) || expected > kMaxFirstTime * static_cast<double>(left)) return false;
+        const Of one = adaptive_ ? Of::centres : Of::samples;
+        const double expected =
+            static_cast<double>(costs_.expected_ns(one, (adaptive_ ? 1 : uniform_samples()) * passes_.pixels()));
+        if (!costs_.known(one) || expected > kMaxFirstTime * static_cast<double>(left)) return false;
         PassLimit most = limit();
         most.until_ns -= left / 10;
         return take_one_sample(most);
     }
-    [[nodiscard]] Of cost_of_one() const { return adaptive_ ? Of::centres : Of::samples; }
-
     [[nodiscard]] FrameStep recorded_step() const { return static_cast<FrameStep>(budget_.step); }
     void replay_first_image() {
         if (recorded_step() == FrameStep::nothing) return;
@@ -234,63 +240,88 @@ private:
             take_one_sample({});
     }
 
-    /// A pilot pass over a sixteenth of the tiles measures the number of rays per sample; the other tiles follow if
-    /// they are nearly certain to fit.
-    bool take_pilot_and_rest() {
-        if (!take_pilot()) return false;
-        const std::uint64_t taken = account_.samples;
-        const PassLimit rest = limit();
-        if ((rays_each_.sample + rays_each_.path) * static_cast<double>(passes_.pixels() - taken) >
-            kMaxPilotPrediction * static_cast<double>(rest.rays))
-            return false;
-        return take_first_samples(rest, Tiles::all_but_pilot);
+    /// Light by paths is sampled uniformly if so many samples of each pixel are expected to fit.
+    [[nodiscard]] std::uint64_t uniform_samples() const {
+        return sample_.parts == LightParts::both ? kUniformSamples : 1;
     }
-    bool take_pilot() {
-        if (budget_.kind == BudgetKind::rays && kMinRaysOfPilot * passes_.pixels() / kPilotPart > rays_left())
-            return false;
+    /// A pilot pass over a sixteenth of the tiles measures the number of rays per sample; the other tiles follow if
+    /// a few samples of each pixel are expected to fit.
+    bool take_pilot_and_rest() {
+        if (2 * uniform_samples() * passes_.pixels() > rays_left()) return false;
         PassLimit part = limit();
         part.rays /= 2;
-        return pilot_ = take_first_samples(part, Tiles::pilot);
+        if (!take_first_samples(part, Tiles::pilot)) return false;
+        const std::uint64_t taken = account_.samples;
+        const PassLimit rest = limit();
+        if ((rays_each_.sample + rays_each_.path) *
+                static_cast<double>(uniform_samples() * passes_.pixels() - taken) <=
+            kMaxPilotPrediction * static_cast<double>(rest.rays))
+            return take_first_samples(rest, Tiles::all_but_pilot);
+        discard();
+        return false;
     }
 
     // Less than one sample per pixel.
 
     /// Traces the pixels of ever finer lattices, those with the largest contrasts first.
     void fill() {
-        if (!adaptive_ && !pilot_ && (budget_.kind != BudgetKind::rays) && paths_fit()) take_pilot();
-        // If even a few paths do not fit, the image shows direct light alone.
-        filled_by_centres_ = adaptive_ || !pilot_;
-        const Frame& f = adaptive_ ? coarse() : pilot_ ? sample_ : centre_;
-        if (adaptive_)
-            frame_ = &f;  // nothing is traced yet
-        else
-            change_to(f);
         filled_ = true;
-        passes_.begin_fill(pilot_);
-        const int first = take_first_lattice(f);
+        // If even a few paths do not fit, the image shows direct light alone.
+        direct_alone_ = !adaptive_ && !paths_fit();
+        int first = direct_alone_ ? 0 : take_first_lattice(coarse());
+        if (first == 0 && !adaptive_) {
+            discard();
+            direct_alone_ = true;
+            first = take_first_lattice(centre_);
+        }
         if (first == 0) return;
-        for (int stride = first; stride >= 1; stride /= 2) {
-            if (stride == 1 && filled_by_centres_ && !adaptive_) break;
-            if (stride < first && !take_lattice(f, stride)) return;
+        const int last = direct_alone_ ? 2 : 1;
+        for (int stride = first; stride >= last; stride /= 2) {
+            if (stride < first && !take_lattice(*frame_, stride)) return;
             account_.step = step_of(stride);
-            if (stride == 2 && adaptive_ && worth_sparse() && refine_sparse()) return;
+            if (stride == 2 && !direct_alone_ && worth_sparse() && refine_sparse()) return;
         }
     }
     /// The first image: one pixel in 2 x 2, whose batches are full, if that is expected to fit; else one in 4 x 4.
     /// It is completed even if it is late: a coarser one would take two thirds of its time. Returns the stride, 0
     /// if nothing was taken.
     int take_first_lattice(const Frame& f) {
+        if (adaptive_)
+            frame_ = &f;  // nothing is traced yet
+        else
+            change_to(f);
+        passes_.begin_fill();
         passes_.plan_fill(2, true);
         const bool fits = static_cast<double>(passes_.fill().total()) <= pixels_of_first_lattice();
         if (!fits) passes_.plan_fill(4, true);
         const PassLimit most = budget_.kind == BudgetKind::time ? PassLimit{} : limit();
-        if (!take_planned(f, {}, PixelFill::all(), most)) return 0;
+        const PixelFill& plan = passes_.fill();
+        const Fill few = first_few();
+        if (plan.total(few) > 0 && !take_planned(f, {}, few, most)) return 0;
+        const std::uint64_t rest = plan.total() - plan.total(few);
+        if (rest > 0 &&
+            (static_cast<double>(rest) > fitting_pixels() || !take_planned(f, few, PixelFill::all(), limit())))
+            return 0;
+        account_.step = step_of(4);
+        to_show_ = ToShow::filled;
         account_.coarsest_late = budget_.kind == BudgetKind::time && ns_left() < 0;
         return fits ? 2 : 4;
     }
+    /// The first pass of the first lattice: all of it, but with a budget in rays a few paths that measure the
+    /// number of rays of each.
+    [[nodiscard]] Fill first_few() const {
+        const PixelFill& plan = passes_.fill();
+        if (budget_.kind == BudgetKind::passes) return plan.reach({}, budget_.passes[0]);
+        if (budget_.kind == BudgetKind::rays && !by_centres_alone())
+            return plan.reach({}, static_cast<double>(plan.total()) / kPilotPart);
+        return PixelFill::all();
+    }
+    /// Every sample is a centre with direct light by the Sun alone: a camera ray and a Sun ray.
+    [[nodiscard]] bool by_centres_alone() const { return adaptive_ || direct_alone_; }
+    [[nodiscard]] Of cost_of_one() const { return by_centres_alone() ? Of::centres : Of::paths; }
     [[nodiscard]] double pixels_of_first_lattice() const {
         switch (budget_.kind) {
-            case BudgetKind::rays: return fitting_pixels() * (filled_by_centres_ ? 1 : kFirstFillRays);
+            case BudgetKind::rays: return by_centres_alone() ? fitting_pixels() : 0;
             case BudgetKind::time:
                 return costs_.known(cost_of_one())
                            ? kMaxFirstTime * static_cast<double>(costs_.fitting(cost_of_one(), ns_left()))
@@ -314,21 +345,30 @@ private:
         return true;
     }
     [[nodiscard]] bool worth_sparse() const {
+        if (!settings_.mechanisms.sample_plan) return false;
+        // If all light has noise, pixels that keep their centres because these show little contrast are too dark in
+        // the mean. Their error remains below that of reconstruction, but not below that of centres everywhere.
+        if (sample_.parts == LightParts::path && static_cast<double>(passes_.pixels()) <= fitting_pixels())
+            return false;
         if (budget_.kind != BudgetKind::time) return true;
         const std::int64_t plans = costs_.expected_ns(Of::reconstruction, passes_.pixels()) +
                                    costs_.expected_ns(Of::plan, passes_.pixels());
         return static_cast<double>(plans) <= kMaxSparsePlan * static_cast<double>(ns_left());
     }
-    /// Sun-only direct lighting: once the contrasts of one pixel in 2 x 2 are known, more samples where these are
-    /// large gain more than the first samples of the pixels where they are small. False: replayed frame without.
+    /// Once the contrasts of one pixel in 2 x 2 are known, more samples where these are large gain more than the
+    /// first samples of the pixels where they are small. False: replayed frame without.
     bool refine_sparse() {
         if (budget_.kind == BudgetKind::passes && recorded_step() != FrameStep::sparse) return false;
         if (fills_ == most_fills()) return true;
         passes_.plan_fill(1, false);
-        const Fill to = budget_.kind == BudgetKind::passes
-                            ? next_fill({})
-                            : passes_.fill().reach({}, kSparseFill * fitting_pixels());
-        if (passes_.fill().total(to) == 0 || !take_planned(coarse_.value(), {}, to, limit())) return true;
+        const double fitting = fitting_pixels();
+        const bool all = static_cast<double>(passes_.fill().total()) +
+                             (kAllCentresRays / 2 - 1) * static_cast<double>(passes_.pixels()) <=
+                         fitting;
+        const Fill to = budget_.kind == BudgetKind::passes ? next_fill({})
+                        : all                              ? PixelFill::all()
+                                                           : passes_.fill().reach({}, kSparseFill * fitting);
+        if (passes_.fill().total(to) == 0 || !take_planned(*frame_, {}, to, limit())) return true;
         reconstruct();
         refine(FrameStep::sparse);
         return true;
@@ -342,17 +382,15 @@ private:
             costs_.record(Of::reconstruction, lattices * passes_.pixels(), now_ns() - start);
     }
     [[nodiscard]] FrameStep step_of(int stride) const {
-        if (filled_by_centres_ && !adaptive_) return FrameStep::no_indirect;
+        if (direct_alone_) return FrameStep::no_indirect;
         return stride == 1 ? FrameStep::one_sample : stride == 2 ? FrameStep::coarse_2 : FrameStep::coarse_4;
     }
     bool take_planned(const Frame& f, Fill from, Fill to, const PassLimit& l) {
-        const PassCount pass = passes_.fill(f, filled_by_centres_, from, to, l);
+        const PassCount pass = passes_.fill(f, from, to, l);
         // A batch that is not full takes as long.
         costs_.record(cost_of_one(), kLanes * pass.batches, pass.wall_ns);
         if (!account_for(pass, l, false)) return false;
-        if (account_.step == FrameStep::nothing) account_.step = step_of(4);
-        to_show_ = ToShow::filled;
-        if (!filled_by_centres_) rays_each_ = rays_each(pass);
+        rays_each_ = rays_each(pass);
         account_.passes[fills_++] =
             static_cast<std::uint32_t>(passes_.fill().total(to) - passes_.fill().total(from));
         return true;
@@ -363,7 +401,7 @@ private:
         double pixels = fitting_pixels();
         // The first pixels of a lattice, at edges, may cost more than those before.
         if (budget_.kind == BudgetKind::time) pixels *= from.level == 0 ? kFirstFillTime : kNextFillTime;
-        if (budget_.kind == BudgetKind::rays && !filled_by_centres_ && from.level == 0) pixels *= kFirstFillRays;
+        if (budget_.kind == BudgetKind::rays && !by_centres_alone() && from.level == 0) pixels *= kFirstFillRays;
         if (fills_ == most_fills()) return from;
         // The account has room for one more pass: only if that takes all.
         if (fills_ + 1 == most_fills() && budget_.kind != BudgetKind::passes && pixels < left) return from;
@@ -377,7 +415,7 @@ private:
             case BudgetKind::passes: return fills_ < most_fills() ? budget_.passes[fills_] : 0;
             case BudgetKind::rays:
                 return static_cast<double>(rays_left()) /
-                       (filled_by_centres_ ? 2 : (rays_each_.sample + rays_each_.path) / kNextPassRaysOfPaths);
+                       (by_centres_alone() ? 2 : (rays_each_.sample + rays_each_.path) / kNextPassRaysOfPaths);
             case BudgetKind::time:
                 return kFilledLanes * static_cast<double>(costs_.fitting(cost_of_one(), ns_left()));
             default: return 0;
@@ -385,19 +423,24 @@ private:
     }
     /// True if a path for one pixel in eight is expected to fit.
     [[nodiscard]] bool paths_fit() const {
-        if (budget_.kind == BudgetKind::passes) return recorded_step() != FrameStep::no_indirect;
-        return !costs_.known(Of::samples) || costs_.expected_ns(Of::samples, passes_.pixels() / 8) < ns_left();
+        switch (budget_.kind) {
+            case BudgetKind::passes: return recorded_step() != FrameStep::no_indirect;
+            case BudgetKind::rays:
+                return kMinRaysOfPaths * static_cast<double>(passes_.pixels()) <= static_cast<double>(rays_left());
+            default: return costs_.expected_ns(Of::paths, passes_.pixels() / 8) < ns_left();
+        }
     }
-    /// Sun-only direct lighting: the centres as in an image of one sample per pixel.
+    /// The centres as in an image of one sample per pixel.
     const Frame& coarse() {
-        coarse_settings_ = with_spp(centre_settings_, 1);
+        coarse_settings_ = with_spp(settings_, 1);
         return coarse_.emplace(
             make_frame(centre_.render_scene, centre_.at, centre_.camera, centre_.pose, coarse_settings_));
     }
 
     /// Further samples, pass by pass.
     void refine(FrameStep step = FrameStep::refined) {
-        if (adaptive_) {
+        if (filled_) sample_.transport.path.first_survival = frame_->transport.path.first_survival;
+        if (by_contrast()) {
             const std::int64_t start = now_ns();
             passes_.make_plan(*frame_, true);
             costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
@@ -448,6 +491,8 @@ private:
                         kMaxSamples);
     }
 
+    /// Samples are planned by the contrasts of the centres.
+    [[nodiscard]] bool by_contrast() const { return adaptive_ || filled_; }
     struct RaysEach {
         double sample = 2, path = 0;  ///< default for Sun-only direct lighting: one camera ray and one Sun ray
     };
@@ -467,8 +512,13 @@ private:
         if (budget_.kind == BudgetKind::rays) {
             const double left = static_cast<double>(rays_left()) - for_sunlight(static_cast<double>(budget_.rays));
             if (left < kMinRemainder * static_cast<double>(budget_.rays)) return stage_;
-            const double part = adaptive_ ? kNextPassRays : pass == fills_ ? kFirstPassRays : kNextPassRaysOfPaths;
-            return plan.reach(stage_, std::min(part * left, kMaxSamples), rays_each_.sample, rays_each_.path);
+            const double part = adaptive_        ? kNextPassRays
+                                : pass == fills_ ? (filled_ ? kFirstSparseRays : kFirstPassRays)
+                                                 : kNextPassRaysOfPaths;
+            // By contrast, samples come in powers of two. In light of two parts, half of these have paths.
+            const double with_paths = !by_contrast() ? 0 : sample_.parts == LightParts::both ? 0.5 : 1;
+            const double each = rays_each_.sample + with_paths * rays_each_.path;
+            return plan.reach(stage_, std::min(part * left, kMaxSamples), each, rays_each_.path);
         }
         if (!worth_a_pass()) return stage_;
         const auto fitting = static_cast<double>(costs_.fitting(Of::samples, ns_for_samples()));
@@ -499,7 +549,7 @@ private:
         const std::int64_t start = now_ns();
         if (to_show_ == ToShow::centres) passes_.show_centres(centre_, out_);
         if (to_show_ == ToShow::filled) {
-            passes_.show_filled(*frame_, filled_by_centres_, out_, variance_);
+            passes_.show_filled(*frame_, out_, variance_);
             if (account_.step != FrameStep::no_indirect) account_.standard_error = passes_.standard_error();
         }
         if (to_show_ == ToShow::means) {
@@ -514,9 +564,10 @@ private:
     PassCosts& costs_;
     const FrameBudget budget_;
     const std::int64_t start_ns_, slack_ns_;
-    const FrameSettings centre_settings_, sample_settings_;
-    const Frame centre_, sample_;
-    const bool has_indirect_, adaptive_, separate_sunlight_;
+    const FrameSettings &settings_, centre_settings_, sample_settings_;
+    const Frame centre_;
+    Frame sample_;
+    const bool adaptive_, separate_sunlight_;
     RadianceImage& out_;
     std::vector<float>* const variance_;
 
@@ -528,10 +579,9 @@ private:
     ToShow to_show_ = ToShow::nothing;
     FrameSettings coarse_settings_;
     std::optional<Frame> coarse_;
-    bool pilot_ = false;   ///< the pilot pass is part of the image
-    bool filled_ = false;  ///< the image has less than one sample per pixel, or had
-    bool filled_by_centres_ = false;
-    std::size_t fills_ = 0;  ///< passes that filled the image
+    bool filled_ = false;        ///< the image has less than one sample per pixel, or had
+    bool direct_alone_ = false;  ///< filled without paths, although the scene sets them
+    std::size_t fills_ = 0;      ///< passes that filled the image
     Stage stage_ = SamplePlan::none();
 };
 

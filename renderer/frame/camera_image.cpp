@@ -137,10 +137,9 @@ struct CameraRenderer::Impl {
             expected_ns = wall_ns;
             return;
         }
-        // Centres of frames of paths have direct light alone.
-        const bool by_centres = settings.spp == 1 && settings.method == RenderSettings::Method::direct;
-        const PassCosts::Of one =
-            by_centres && costs.known(PassCosts::Of::centres) ? PassCosts::Of::centres : PassCosts::Of::samples;
+        const PassCosts::Of centre =
+            settings.method == RenderSettings::Method::direct ? PassCosts::Of::centres : PassCosts::Of::paths;
+        const PassCosts::Of one = settings.spp == 1 && costs.known(centre) ? centre : PassCosts::Of::samples;
         expected_ns = costs.known(one)
                           ? costs.expected_ns(one, passes.pixels() * static_cast<std::uint64_t>(settings.spp))
                           : static_cast<std::int64_t>(tuning::kSkippedDecay * static_cast<double>(expected_ns));

@@ -20,9 +20,6 @@ using namespace tuning;
 /// Sums are formed per chunk, so that they do not depend on the threads.
 constexpr std::size_t kChunk = kTilesPerTask;
 
-/// So many centres of a tile are traced together with those of the next ones.
-constexpr int kFewCentres = 8;
-
 /// Finds tiles that may show light although no body is in view: the Sun's disc, area lights, a non-uniform
 /// background, a medium.
 class EmittersInView {
@@ -50,6 +47,12 @@ private:
     bool everywhere_ = false, sun_ = false;
     double within_rad_ = 0;
 };
+
+/// The squared error of reconstruction as a part of the squared difference between traced pixels and their
+/// neighbours.
+double part_not_noise(const Frame& f) {
+    return f.parts == LightParts::direct ? 1 : kPartNotNoise;
+}
 
 // Lattices of tiles: a tenth of them, in blocks of 4 x 4, and a sixteenth.
 bool is_error_tile(int tx, int ty) {
@@ -131,7 +134,7 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
 
 void FramePasses::begin(const Frame& f, const Lens* lens) {
     find_background(f);
-    g_buffer_.begin_frame(background_);
+    g_buffer_.begin_frame(background_, f.parts);
     if (f.settings.mechanisms.tile_culling && !f.over_time)
         culling_.update(f.at, f.T_world_camera, lens);
     else
@@ -293,28 +296,20 @@ void FramePasses::show_centres(const Frame& f, RadianceImage& out) {
     });
 }
 
-void FramePasses::begin_fill(bool with_pilot) {
+void FramePasses::begin_fill() {
     keep_fill();
     fill_->begin(tiles_);
-    if (!with_pilot) return;
-    for (const std::uint32_t i : tiles_)
-        if (is_pilot_tile(tile(i).x / kTile, tile(i).y / kTile)) fill_->set_traced(i);
 }
 
-PassCount FramePasses::fill(const Frame& f, bool centres, PixelFill::Stage from, PixelFill::Stage to,
-                            const PassLimit& limit) {
+PassCount FramePasses::fill(const Frame& f, PixelFill::Stage from, PixelFill::Stage to, const PassLimit& limit) {
+    const int few = f.parts == LightParts::direct ? kFewCentres : 0;  // paths are reused within a tile
     const PassCount count = over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         const std::uint64_t places = fill_->between(t.index, from, to);
         if (places == 0) return;
-        if (centres && std::popcount(places) <= kFewCentres)
-            return w.gather_centres(t, camera_.width, places, g_buffer_);
-        if (centres) return w.centres(t, camera_.width, places, g_buffer_);
-        const auto none = [](std::size_t) { return 0u; };
-        const auto one = [places](std::size_t at) { return static_cast<std::uint32_t>(places >> at & 1); };
-        w.samples(t, camera_.width, none, one,
-                  [&](const SampleBatch& b, const TracedRays& p, const BatchRadiance& light) {
-                      g_buffer_.store(f, p, light, b.place, t.index);
-                  });
+        if (std::popcount(places) <= few)
+            w.gather_centres(t, camera_.width, places, g_buffer_);
+        else
+            w.centres(t, camera_.width, places, g_buffer_);
     });
     if (count.complete)
         fill_->take(g_buffer_, tiles_, from, to);
@@ -323,7 +318,8 @@ PassCount FramePasses::fill(const Frame& f, bool centres, PixelFill::Stage from,
     return count;
 }
 
-void FramePasses::show_filled(const Frame& f, bool centres, RadianceImage& out, std::vector<float>* variance) {
+void FramePasses::show_filled(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
+    const double part = part_not_noise(f);
     fill_background(out);
     const auto counts = [&](std::uint32_t tile) {
         return variance != nullptr || estimates(tile, kManyFilledTiles);
@@ -335,12 +331,10 @@ void FramePasses::show_filled(const Frame& f, bool centres, RadianceImage& out, 
         put_pixels(t, pixels.r, pixels.g, pixels.b, out);
         if (counts(t.index)) {
             TileContrast contrast;
-            if (centres) g_buffer_.contrast(f, t.index, contrast);
+            g_buffer_.contrast(f, t.index, contrast);
             t.each_pixel([&](int x, int y, std::size_t at) {
-                const bool traced = fill_->is_traced(t.index, at);
-                const double squared =
-                    centres ? (traced ? static_cast<double>(contrast.centre[at]) : fill_->error_of(t.index, at))
-                            : (traced ? kNoiseOfTraced : kNoiseOfFilled) * fill_->error_of(t.index, at);
+                const double squared = fill_->is_traced(t.index, at) ? static_cast<double>(contrast.centre[at])
+                                                                     : part * fill_->error_of(t.index, at);
                 w.error.add_squared(each * squared);
                 if (variance != nullptr) (*variance)[index_of(x, y, out.width)] = static_cast<float>(squared);
             });
@@ -405,8 +399,11 @@ void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, bool fille
                              std::vector<float>* variance) {
     assert(plan_ && (variance == nullptr || variance->size() == out.pixels.size()));
     fill_background(out);
+    const double part = part_not_noise(f);
     const bool uniform = plan_->is_uniform();
-    const bool needs_contrast = uniform && (variance != nullptr || !SamplePlan::reaches(stage, 2));
+    // The plan's contrasts are those of direct light alone.
+    const bool needs_contrast =
+        uniform ? variance != nullptr || !SamplePlan::reaches(stage, 2) : f.parts != LightParts::direct;
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         const GBufferTile& centres = g_buffer_.tile(t.index);
         const PerPixel<PixelMeans>& means = means_[t.index];
@@ -416,13 +413,13 @@ void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, bool fille
         });
         TileContrast of_samples;
         if (needs_contrast) g_buffer_.contrast(f, t.index, of_samples);
-        const TileContrast& contrast = uniform ? of_samples : plan_->contrast(t.index);
+        const TileContrast& contrast = uniform || needs_contrast ? of_samples : plan_->contrast(t.index);
         w.error.add_tile(uniform && !needs_contrast ? nullptr : &contrast, means);
         if (variance != nullptr) put_variances(t, means, contrast, out.width, *variance);
         if (filled)
             t.each_pixel([&](int x, int y, std::size_t at) {
                 if (means[at].count() > 0 || fill_->is_traced(t.index, at)) return;
-                const double squared = fill_->error_of(t.index, at);
+                const double squared = part * fill_->error_of(t.index, at);
                 w.error.add_squared(squared - static_cast<double>(contrast.centre[at]));
                 if (variance != nullptr) (*variance)[index_of(x, y, out.width)] = static_cast<float>(squared);
             });

@@ -68,18 +68,16 @@ public:
     void keep_fill() {
         if (!fill_) fill_.emplace(g_buffer_);
     }
-    /// Starts an image with less than one sample per pixel (pixel_fill.h). `with_pilot`: the tiles of the pilot
-    /// pass have a sample of each pixel already.
-    void begin_fill(bool with_pilot);
+    /// Starts an image with less than one sample per pixel (pixel_fill.h).
+    void begin_fill();
     void plan_fill(int stride, bool first) { fill_->plan(g_buffer_, tiles_, stride, first); }
     [[nodiscard]] const PixelFill& fill() const noexcept { return *fill_; }
-    /// Traces the planned pixels between two stages: their centres, or the first samples of their sequences.
-    PassCount fill(const Frame& f, bool centres, PixelFill::Stage from, PixelFill::Stage to,
-                   const PassLimit& limit);
+    /// Traces the centres of the planned pixels between two stages.
+    PassCount fill(const Frame& f, PixelFill::Stage from, PixelFill::Stage to, const PassLimit& limit);
     /// Reconstructs the pixels without a sample.
     void reconstruct() { fill_->reconstruct(g_buffer_, tiles_); }
     /// Writes the reconstructed image.
-    void show_filled(const Frame& f, bool centres, RadianceImage& out, std::vector<float>* variance);
+    void show_filled(const Frame& f, RadianceImage& out, std::vector<float>* variance);
 
     /// Makes an adaptive plan from the contrasts of the centres, or a uniform plan.
     void make_plan(const Frame& f, bool adaptive);

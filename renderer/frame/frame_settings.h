@@ -5,11 +5,11 @@
 /// first samples are the pixels' centres. Their contrasts decide where further samples go, and the centres are
 /// discarded there: sample counts that depend on the samples themselves bias the mean (D. Kirk, J. Arvo, "Unbiased
 /// sampling techniques for image synthesis", SIGGRAPH 1991). All other light gets uniform passes, whose samples all
-/// count. If the Sun is the only source of direct light and the budget is large enough, centres come first here
-/// too; after the uniform passes their contrasts decide where further samples of direct sunlight go. The number of
-/// samples of a pass is fixed before it begins, and a pass that does not end in time is discarded as a whole. So a
-/// frame is a function of the scene, the poses, its number, the seed and the sizes of its passes: the clock only
-/// chooses these sizes.
+/// count; but where only few samples per pixel fit, edges cause most of the error, and centres come first here too.
+/// So they do if the Sun is the only source of direct light and the budget is large: after the uniform passes their
+/// contrasts decide where further samples of direct sunlight go. The number of samples of a pass is fixed before it
+/// begins, and a pass that does not end in time is discarded as a whole. So a frame is a function of the scene, the
+/// poses, its number, the seed and the sizes of its passes: the clock only chooses these sizes.
 #pragma once
 
 #include <array>

@@ -49,8 +49,10 @@ GBuffer::GBuffer(int width, int height)
       tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
       known_(tiles_.size(), Known::nothing) {}
 
-void GBuffer::begin_frame(const Rgb& background) {
+void GBuffer::begin_frame(const Rgb& background, LightParts parts) {
     background_ = background;
+    parts_ = parts;
+    if (parts == LightParts::both && direct_.empty()) direct_.resize(tiles_.size());
     std::fill(known_.begin(), known_.end(), Known::nothing);
 }
 
@@ -106,12 +108,15 @@ void GBuffer::store(const Frame& f, const TracedRays& p, const BatchRadiance& li
     put(seen.nx, tile.nx), put(seen.ny, tile.ny), put(seen.nz, tile.nz);
     put(seen.depth_m, tile.depth_m), put(seen.surface, tile.surface);
     if (f.parts != LightParts::direct) put(p.variance, tile.reused);
+    if (f.parts != LightParts::both) return;
+    for (std::size_t i = 0; i < p.rays.n; ++i) direct_[tile_index][place[i]] = mean_band(light.direct[i]);
 }
 
 void GBuffer::store(const Frame& f, const TracedRays& p, const BatchRadiance& light,
                     const Lanes<std::uint8_t>& place, const Lanes<std::uint32_t>& tile) noexcept {
     LaneSurfaces seen{};
     if (p.hits.met != 0) store_surfaces(f, p, seen);
+    assert(f.parts == LightParts::direct);
     for (std::size_t i = 0; i < p.rays.n; ++i) {
         GBufferTile& t = tiles_[tile[i]];
         const std::size_t at = place[i];
@@ -119,7 +124,6 @@ void GBuffer::store(const Frame& f, const TracedRays& p, const BatchRadiance& li
         t.r[at] = radiance.x, t.g[at] = radiance.y, t.b[at] = radiance.z;
         t.nx[at] = seen.nx[i], t.ny[at] = seen.ny[i], t.nz[at] = seen.nz[i];
         t.depth_m[at] = seen.depth_m[i], t.surface[at] = seen.surface[i];
-        if (f.parts != LightParts::direct) t.reused[at] = p.variance[i];
         if (seen.surface[i] != 0 || radiance != background_) known_[tile[i]] = Known::something;
     }
 }
@@ -127,12 +131,9 @@ void GBuffer::store(const Frame& f, const TracedRays& p, const BatchRadiance& li
 namespace {
 
 /// `n` pixels of a tile, from `place` on.
-template <std::size_t n, class Around>
-void copy_pixels(const GBufferTile& t, std::size_t place, Around& a, std::size_t at) {
-    for (std::size_t i = 0; i < n; ++i) {
-        const float r = t.r[place + i], g = t.g[place + i], b = t.b[place + i];
-        a.radiance[at + i] = (r + g + b) / 3;
-    }
+template <std::size_t n, class Around, class Radiance>
+void copy_pixels(const GBufferTile& t, const Radiance& radiance, std::size_t place, Around& a, std::size_t at) {
+    for (std::size_t i = 0; i < n; ++i) a.radiance[at + i] = radiance(place + i);
     std::copy_n(&t.nx[place], n, &a.nx[at]);
     std::copy_n(&t.ny[place], n, &a.ny[at]);
     std::copy_n(&t.nz[place], n, &a.nz[at]);
@@ -152,8 +153,10 @@ constexpr std::size_t cell(int row, int column) {
 
 }  // namespace
 
-/// Beyond the image its border pixels are repeated, which gives no edge. The corners of the border are not used.
-void GBuffer::gather(const Frame& f, std::size_t tile, Around& a) const noexcept {
+/// `radiance(tile, place)`: a mean band. Beyond the image its border pixels are repeated, which gives no edge. The
+/// corners of the border are not used.
+template <class Radiance>
+void GBuffer::gather(const Frame& f, std::size_t tile, const Radiance& radiance, Around& a) const noexcept {
     const int tx = static_cast<int>(tile) % tiles_x_, ty = static_cast<int>(tile) / tiles_x_;
     if (const Pinhole* pinhole = f.model->pinhole()) {
         const auto [origin, per_x, per_y] = pinhole->rays(f.T_world_camera.q);
@@ -166,13 +169,14 @@ void GBuffer::gather(const Frame& f, std::size_t tile, Around& a) const noexcept
     const int columns = std::min(kTile, width_ - tx * kTile), rows = std::min(kTile, height_ - ty * kTile);
     const GBufferTile& own = tiles_[tile];
     const float background = mean_band(background_);
+    const auto of = [&](std::size_t t) { return [&radiance, t](std::size_t place) { return radiance(t, place); }; };
     for (int row = 0; row < kTile; ++row) {
-        copy_pixels<4>(own, place_in_tile(0, row), a, cell(row, 0));
-        copy_pixels<4>(own, place_in_tile(4, row), a, cell(row, 4));
+        copy_pixels<4>(own, of(tile), place_in_tile(0, row), a, cell(row, 0));
+        copy_pixels<4>(own, of(tile), place_in_tile(4, row), a, cell(row, 4));
     }
     const auto pixel_of = [&](std::size_t other, int x, int y, std::size_t at) {
         if (is_traced(other))
-            copy_pixels<1>(tiles_[other], place_in_tile(x, y), a, at);
+            copy_pixels<1>(tiles_[other], of(other), place_in_tile(x, y), a, at);
         else
             a.radiance[at] = background;
     };
@@ -317,15 +321,48 @@ bool GBuffer::in_empty_space(std::size_t tile) const noexcept {
 }
 
 void GBuffer::contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept {
+    const auto total = [this](std::size_t t, std::size_t place) {
+        const GBufferTile& of = tiles_[t];
+        return (of.r[place] + of.g[place] + of.b[place]) / 3;
+    };
+    contrast(f, tile, total, !f.transport.path.direct, out);
+}
+
+void GBuffer::contrast_of_direct(const Frame& f, std::size_t tile, TileContrast& out) const noexcept {
+    assert(parts_ == LightParts::both);
+    contrast(
+        f, tile, [this](std::size_t t, std::size_t place) { return direct_[t][place]; }, false, out);
+}
+
+void GBuffer::put_like(std::size_t tile, std::size_t place, std::size_t other, std::size_t there) noexcept {
+    GBufferTile& t = tiles_[tile];
+    const GBufferTile& like = tiles_[other];
+    t.surface[place] = like.surface[there], t.depth_m[place] = like.depth_m[there];
+    t.nx[place] = like.nx[there], t.ny[place] = like.ny[there], t.nz[place] = like.nz[there];
+    t.reused[place] = like.reused[there];
+    if (parts_ == LightParts::both) direct_[tile][place] = direct_[other][there];
+}
+
+void GBuffer::put_background(std::size_t tile, std::size_t place) noexcept {
+    GBufferTile& t = tiles_[tile];
+    t.r[place] = background_.x, t.g[place] = background_.y, t.b[place] = background_.z;
+    t.nx[place] = t.ny[place] = t.nz[place] = t.depth_m[place] = t.reused[place] = 0;
+    t.surface[place] = 0;
+    if (parts_ == LightParts::both) direct_[tile][place] = mean_band(background_);
+}
+
+template <class Radiance>
+void GBuffer::contrast(const Frame& f, std::size_t tile, const Radiance& radiance, bool with_reused,
+                       TileContrast& out) const noexcept {
     if (in_empty_space(tile)) {
         out = {};
         return;
     }
     Around a;
-    gather(f, tile, a);
+    gather(f, tile, radiance, a);
     measure_contrasts(a, out);
     out.reused.fill(0);
-    if (!f.transport.path.direct)
+    if (with_reused)
         for (std::size_t i = 0; i < kTilePixels; ++i) {
             if (tiles_[tile].surface[i] != 0) out.reused[i] = tiles_[tile].reused[i];
             out.centre[i] += out.reused[i];

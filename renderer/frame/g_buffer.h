@@ -104,8 +104,8 @@ public:
         return tiles_[i];
     }
 
-    /// Starts a frame in which no tile is traced yet; untraced tiles show this background.
-    void begin_frame(const Rgb& background);
+    /// Starts a frame in which no tile is traced yet; untraced tiles show this background. `parts`: of its light.
+    void begin_frame(const Rgb& background, LightParts parts);
     void set_traced(std::size_t tile) noexcept { known_[tile] = Known::background; }
     [[nodiscard]] bool is_traced(std::size_t tile) const noexcept { return known_[tile] != Known::nothing; }
     [[nodiscard]] const Rgb& background() const noexcept { return background_; }
@@ -124,18 +124,31 @@ public:
 
     /// Computes contrasts from a tile and its neighbours.
     void contrast(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
+    /// The same, in light of two parts of the direct one alone, which has no noise.
+    void contrast_of_direct(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
+
+    /// A pixel without a sample shows the surface that another one does.
+    void put_like(std::size_t tile, std::size_t place, std::size_t other, std::size_t there) noexcept;
+    void put_background(std::size_t tile, std::size_t place) noexcept;
 
     /// A tile with a border of its neighbours' pixels.
     struct Around;
 
 private:
-    void gather(const Frame& f, std::size_t tile, Around& a) const noexcept;
+    template <class Radiance>
+    void gather(const Frame& f, std::size_t tile, const Radiance& radiance, Around& a) const noexcept;
+    template <class Radiance>
+    void contrast(const Frame& f, std::size_t tile, const Radiance& radiance, bool with_reused,
+                  TileContrast& out) const noexcept;
     [[nodiscard]] bool shows_background(const Frame& f, const TracedRays& p,
                                         const BatchRadiance& light) const noexcept;
 
     int width_, height_, tiles_x_, tiles_y_;
     Rgb background_{};
     std::vector<GBufferTile> tiles_;
+    /// Light of two parts: mean band of the direct one. Allocated when first needed.
+    std::vector<PerPixel<float>> direct_;
+    LightParts parts_ = LightParts::direct;
     /// State of a tile: not traced; only background so far; something else.
     enum class Known : std::uint8_t { nothing, background, something };
     std::vector<Known> known_;

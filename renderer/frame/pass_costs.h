@@ -14,7 +14,8 @@ namespace narpa {
 /// Measured wall time of passes with all threads at work. It decides which passes begin, not their contents.
 class PassCosts {
 public:
-    enum class Of : std::uint8_t { centres, plan, samples, sunlight, show, reconstruction };
+    /// centres: with direct light alone; paths: with all light.
+    enum class Of : std::uint8_t { centres, paths, plan, samples, sunlight, show, reconstruction };
 
     /// `pieces`: pixels or samples of the pass.
     void record(Of what, std::uint64_t pieces, std::int64_t wall_ns) noexcept {
@@ -58,8 +59,8 @@ private:
         std::uint8_t measurements = 0;  ///< so far; 2: two or more
     };
     static constexpr std::size_t index(Of what) noexcept { return static_cast<std::size_t>(what); }
-    std::array<Cost, 6> costs_ = [] {
-        std::array<Cost, 6> initial{};
+    std::array<Cost, 7> costs_ = [] {
+        std::array<Cost, 7> initial{};
         for (std::size_t i = 0; i < initial.size(); ++i) initial[i].ns = tuning::kInitialCosts_ns[i];
         return initial;
     }();

@@ -82,18 +82,20 @@ struct WindowPlanes {
     WindowGrid<std::uint32_t> surface, known;  ///< known: 1 or 0
 };
 struct alignas(64) Window : WindowPlanes {
-    std::array<const GBufferTile*, 9> tiles{};  ///< null: shows the background
+    static constexpr std::uint32_t kBackground = ~0u;
+    std::array<std::uint32_t, 9> tiles;  ///< kBackground: not traced
 
     /// `known_pixels`: of each tile, those within the image. The tile's own pixels must not be changed meanwhile,
     /// nor other tiles' known ones.
     Window(const GBuffer& from, std::uint32_t tile, int border, std::span<const std::uint64_t> known_pixels) {
         std::memset(static_cast<WindowPlanes*>(this), 0, sizeof(WindowPlanes));
+        tiles.fill(kBackground);
         const int tx = static_cast<int>(tile) % from.tiles_x(), ty = static_cast<int>(tile) / from.tiles_x();
         for (int y = -1; y <= 1; ++y)
             for (int x = -1; x <= 1; ++x) {
                 if (tx + x < 0 || ty + y < 0 || tx + x >= from.tiles_x() || ty + y >= from.tiles_y()) continue;
-                const auto other = static_cast<std::size_t>((ty + y) * from.tiles_x() + tx + x);
-                if (from.is_traced(other)) tiles[static_cast<std::size_t>((y + 1) * 3 + x + 1)] = &from.tile(other);
+                const auto other = static_cast<std::uint32_t>((ty + y) * from.tiles_x() + tx + x);
+                if (from.is_traced(other)) tiles[static_cast<std::size_t>((y + 1) * 3 + x + 1)] = other;
             }
         const GBufferTile& own = from.tile(tile);
         for (int y = 0; y < kTile; ++y)
@@ -123,8 +125,8 @@ struct alignas(64) Window : WindowPlanes {
         for (std::size_t i = 0; i < 4; ++i)
             known[at + i] = static_cast<std::uint32_t>(known_places >> (place + i) & 1);
     }
-    /// The tile's data of a cell, null for the background, and its place there.
-    [[nodiscard]] std::pair<const GBufferTile*, std::size_t> pixel(std::size_t at) const {
+    /// The tile of a cell and its place there.
+    [[nodiscard]] std::pair<std::uint32_t, std::size_t> pixel(std::size_t at) const {
         const int x = static_cast<int>(at) % kWindowRow - kWindowBorder,
                   y = static_cast<int>(at) / kWindowRow - kWindowBorder;
         const int column = x < 0 ? -1 : x >= kTile ? 1 : 0, row = y < 0 ? -1 : y >= kTile ? 1 : 0;
@@ -296,11 +298,7 @@ void PixelFill::reconstruct_tile(GBuffer& g_buffer, std::uint32_t tile, int stri
     guess.known |= to_guess;
     guess.silhouettes &= ~to_guess;
     const Rgb background = g_buffer.background();
-    const auto put_background = [&](std::size_t place) {
-        t.r[place] = background.x, t.g[place] = background.y, t.b[place] = background.z;
-        t.nx[place] = t.ny[place] = t.nz[place] = t.depth_m[place] = t.reused[place] = 0;
-        t.surface[place] = 0;
-    };
+    const auto put_background = [&](std::size_t place) { g_buffer.put_background(tile, place); };
     if (g_buffer.in_empty_space(tile)) {
         each_place(places, put_background);
         return each_place(to_guess, [&](std::size_t place) {
@@ -317,14 +315,10 @@ void PixelFill::reconstruct_tile(GBuffer& g_buffer, std::uint32_t tile, int stri
         const Rgb mean =
             one_side ? Rgb{around.r[at], around.g[at], around.b[at]} : mean_of(w, at, stride, side.neighbours);
         const std::size_t first = first_of(w, at, stride, side.neighbours);
-        const auto [like, there] = w.pixel(first);
-        if (like != nullptr) {
-            t.surface[place] = like->surface[there], t.depth_m[place] = like->depth_m[there];
-            t.nx[place] = like->nx[there], t.ny[place] = like->ny[there], t.nz[place] = like->nz[there];
-            t.reused[place] = like->reused[there];
-        } else {
+        if (const auto [like, there] = w.pixel(first); like != Window::kBackground)
+            g_buffer.put_like(tile, place, like, there);
+        else
             put_background(place);
-        }
         // Exactly the background among nothing else, as in empty space.
         if (t.surface[place] != 0 || around.contrast[at] != 0 || radiance_at(w, first) != background)
             t.r[place] = mean.x, t.g[place] = mean.y, t.b[place] = mean.z;
@@ -366,7 +360,7 @@ void PixelFill::group(std::uint32_t tile) noexcept {
     groups.n = 0;
     const std::uint64_t planned = planned_[tile];
     if (planned == 0) return;
-    if (!has_contrasts_) return groups.add(planned, 1);
+    if (!has_contrasts_) return groups.add(planned, 1 + static_cast<int>(hash_of(tile, 1) % kFirstLevels));
     const std::uint64_t compared = planned & compared_first_[tile];
     if (compared != 0) groups.add(compared, 1 + static_cast<int>(hash_of(tile, 1) % kFirstLevels));
     const Guess& guess = guess_[tile];

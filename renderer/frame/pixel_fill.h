@@ -30,16 +30,14 @@ public:
 
     /// Starts a frame: no pixel of these tiles is traced.
     void begin(std::span<const std::uint32_t> tiles) noexcept;
-    /// Counts all pixels of a tile as traced.
-    void set_traced(std::uint32_t tile) noexcept { traced_[tile] = within(tile); }
 
     /// A stage determines which planned pixels are traced; more from stage to stage.
     struct Stage {
         int level = 0;
     };
-    /// Plans the pixels of the lattice of `stride` (4, 2 or 1) that are not traced yet: all at once in a frame's
-    /// first lattice, else by contrast; the next coarser lattice is traced as a whole then, and the planned pixels
-    /// are reconstructed from it.
+    /// Plans the pixels of the lattice of `stride` (4, 2 or 1) that are not traced yet: in a frame's first lattice
+    /// tile by tile in no order, else by contrast; the next coarser lattice is traced as a whole then, and the
+    /// planned pixels are reconstructed from it.
     void plan(GBuffer& g_buffer, std::span<const std::uint32_t> tiles, int stride, bool first);
     /// The stage of all planned pixels.
     [[nodiscard]] static Stage all() noexcept { return {kLevels}; }

@@ -135,6 +135,12 @@ void SamplePlan::clear() noexcept {
 void SamplePlan::contrast_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile) noexcept {
     TileContrast& c = contrasts_[tile];
     g_buffer.contrast(f, tile, c);
+    if (f.parts == LightParts::both) {
+        // A weight leaves out the noise values that contain the pixel's own centre, but not its edges.
+        TileContrast direct;
+        g_buffer.contrast_of_direct(f, tile, direct);
+        c.edge = direct.edge, c.breaks = direct.breaks;
+    }
     Sums sums;
     for (std::size_t i = 0; i < kTilePixels; ++i) {
         const double variance = static_cast<double>(c.of_sample(i));

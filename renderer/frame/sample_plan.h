@@ -1,12 +1,13 @@
 /// renderer/frame/sample_plan.h - number of samples for each pixel, in successive stages.
 ///
-/// Adaptive sampling, for frames lit only by the Sun, where edges cause most of the error. For a given total, the
-/// error is least if the number of samples is proportional to the standard deviation of a pixel's samples (J.
-/// Neyman, J. R. Stat. Soc. 97, 1934), or to a somewhat lower power of it where low-discrepancy points converge
-/// faster than random ones. The standard deviations come from the contrasts of the G-buffer, never from the samples
-/// that count, because these would be biased by their own number (D. Kirk, J. Arvo, "Unbiased sampling techniques
-/// for image synthesis", SIGGRAPH 1991). Numbers are powers of two, at which these points are at their best;
-/// between two powers a hash of the pixel decides, so that totals follow the budget smoothly.
+/// Adaptive sampling, where edges cause most of the error: in frames lit only by the Sun, and in those of paths
+/// with few samples per pixel. For a given total, the error is least if the number of samples is proportional to
+/// the standard deviation of a pixel's samples (J. Neyman, J. R. Stat. Soc. 97, 1934), or to a somewhat lower power
+/// of it where low-discrepancy points converge faster than random ones. The standard deviations come from the
+/// contrasts of the G-buffer, never from the samples that count, because these would be biased by their own number
+/// (D. Kirk, J. Arvo, "Unbiased sampling techniques for image synthesis", SIGGRAPH 1991). In light of two parts
+/// they are those of the direct part, which has no noise. Numbers are powers of two, at which these points are at
+/// their best; between two powers a hash of the pixel decides, so that totals follow the budget smoothly.
 ///
 /// A pixel keeps its centre sample until it gets kFewest samples at once: where a centre has the squared error e of
 /// an edge, 1, 2, 4 or 8 samples have 2 e, 0.7 e, 0.25 e or 0.09 e, and 4 gain most per sample.

@@ -35,8 +35,12 @@ inline constexpr double kMinRemainder = 0.05;
 inline constexpr double kMaxPilotPrediction = 0.85;
 /// The pilot pass is this part of the tiles.
 inline constexpr std::uint64_t kPilotPart = 16;
-/// Rays left for each sample of the pilot pass, which may take half of them.
-inline constexpr std::uint64_t kMinRaysOfPilot = 12;
+/// Light by paths with separate direct sunlight is sampled uniformly if this many samples of each pixel fit, by
+/// contrast with fewer. RMSE by contrast and uniformly, over that of one sample per pixel, at 3 and 4 times its
+/// rays: craft-paths 0.56 and 0.59, 0.47 and 0.47.
+inline constexpr std::uint64_t kUniformSamples = 3;
+/// With fewer rays for each pixel, paths for one pixel in 4 x 4 are not expected to fit.
+inline constexpr double kMinRaysOfPaths = 0.15;
 
 /// Separate direct sunlight gets samples of its own, with this fraction of the budget, if the budget has this many
 /// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate. craft-paths at 256 x
@@ -52,9 +56,9 @@ inline constexpr std::int64_t kMinSlack_ns = 300'000, kSlackPart = 40;
 
 // Prediction of a pass's wall time (pass_costs.h), runs of docking beside other load.
 
-/// ns per pixel or sample of each kind of pass before any measurement: centres, plan, samples, sunlight, show,
-/// reconstruction of a lattice.
-inline constexpr double kInitialCosts_ns[] = {100, 30, 200, 100, 10, 30};
+/// ns per pixel or sample of each kind of pass before any measurement: centres, centres with
+/// paths, plan, samples, sunlight, show, reconstruction of a lattice.
+inline constexpr double kInitialCosts_ns[] = {100, 200, 30, 200, 100, 10, 30};
 /// After a skipped pass the estimate falls by this factor, to no less than this fraction of the last measurement.
 inline constexpr double kSkippedDecay = 0.95, kMinDecayed = 0.25;
 /// Weight of a new measurement, which counts as within this factor of the estimate.
@@ -106,19 +110,22 @@ inline constexpr float kSilhouetteContrast = 1.0f / 64;
 /// squared contrast.
 inline constexpr double kMinComparisons = 30, kFillErrorOfContrast = 0.2;
 /// In one of so many tiles, one of so many pixels is traced first, to be compared. Docking at 25 s with 0.5 to 1.5
-/// of the rays of one sample per pixel: predicted over measured error 1.2 to 1.5, without it 1.7 to 2.2.
+/// of the rays of one sample per pixel: predicted over measured error 0.9 to 1.0.
 inline constexpr std::uint64_t kComparedTiles = 16, kComparedPlaces = 4;
 /// In small images, in at least so many tiles.
 inline constexpr std::uint64_t kMinComparedTiles = 120;
-/// Where samples are noisy, so are the neighbours with which they are compared: the squared error of a traced and
-/// of a reconstructed pixel, as parts of the mean squared difference. The
-/// craft of tests/renderer/frame, by paths.
-inline constexpr double kNoiseOfTraced = 0.5, kNoiseOfFilled = 0.35;
-/// Sun-only direct lighting: this part of what is left after one pixel in 2 x 2 goes to further pixels, the rest to
-/// further samples; with this many rays per pixel, all centres are traced instead.
+/// Where samples are noisy, a traced pixel differs from its neighbours by its own noise too: the squared error of
+/// reconstruction as a part of the squared difference. craft-paths with 1/14 to 4 times the
+/// rays of one sample per pixel: predicted over measured error 1.01 to 1.25, with 0.35 instead 0.88 to 1.25.
+inline constexpr double kPartNotNoise = 0.5;
+/// This part of what is left after one pixel in 2 x 2 goes to further pixels, the rest to further samples; with
+/// this many rays per pixel in Sun-only direct lighting, or half as many samples, all centres are traced instead.
 inline constexpr double kSparseFill = 0.5, kAllCentresRays = 3;
 /// The plans of these samples may take this part of the time that is left. Runs of docking.
 inline constexpr double kMaxSparsePlan = 0.4;
+/// Up to so many centres of a tile are traced together with those of the next ones. Docking at 50 s, two cores: one
+/// pixel in 4 x 4 takes 25 ms instead of 31.
+inline constexpr int kFewCentres = 8;
 /// A pass is worth its start if it traces this part of a lattice.
 inline constexpr double kMinFill = 0.005;
 /// Pixels in a batch of 16 while lattices are filled, about, as a part. Time of one sample per pixel that is
@@ -126,9 +133,9 @@ inline constexpr double kMinFill = 0.005;
 inline constexpr double kFilledLanes = 0.9, kMaxFirstTime = 0.8;
 /// Parts of the remaining time for the next pixels, and for those after them.
 inline constexpr double kFirstFillTime = 0.6, kNextFillTime = 0.85;
-/// The same of the remaining rays, where a sample may take any number of them: with
-/// 0.9 the first pass of the finest lattice exceeded its limit. The same craft.
-inline constexpr double kFirstFillRays = 0.5;
+/// The same of the remaining rays, where a sample may take any number of them, and for the first further samples:
+/// with 0.9 the first pass of the finest lattice exceeded its limit. craft-paths.
+inline constexpr double kFirstFillRays = 0.5, kFirstSparseRays = 0.6;
 
 // Estimates of variance.
 

@@ -142,7 +142,7 @@ TEST(BudgetFrame, StepsGoDownOneByOneAndEachShowsAWholeImage) {
         }
         EXPECT_EQ(seen, method == Method::direct
                             ? (std::vector{Step::nothing, Step::coarse_4, Step::sparse, Step::refined})
-                            : (std::vector{Step::nothing, Step::no_indirect, Step::coarse_2, Step::one_sample,
+                            : (std::vector{Step::nothing, Step::no_indirect, Step::coarse_4, Step::sparse,
                                            Step::refined}));
     }
 }

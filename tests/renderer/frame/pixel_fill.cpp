@@ -118,20 +118,32 @@ TEST(PixelFill, NearlyAllRaysAreUsed) {
 }
 
 TEST(PixelFill, PathsFillWhatDoesNotFitAndTheErrorIsKnown) {
-    const BudgetView v = craft_over_a_globe(120, 90);
-    const std::vector<double> truth = truth_of(v, 1024, Method::path);
+    const BudgetView v = craft_over_a_globe(200, 150);
+    const std::vector<double> truth = truth_of(v, 512, Method::path);
     CameraRenderer renderer(v.render_scene, v.camera);
-    for (const double rays : {1.2, 1.6}) {
-        double measured = 0, predicted = 0;
+    const Shown one = render(renderer, v, samples_a_pixel(v, 1, 0, Method::path));
+    const double of_one = misses_of(one.image, truth).squared;
+    double before = 1e9;
+    for (const double part : {1.0 / 14, 0.15, 0.3, 0.5, 1.0, 1.6, 2.5, 4.0, 6.0}) {
+        double measured = 0, predicted = 0, used = 0;
         for (std::uint32_t k = 0; k < 3; ++k) {
-            const Shown shown = render(renderer, v, rays_a_pixel(v, rays, k, Method::path));
-            EXPECT_TRUE(is_filled(shown.account.step)) << rays;
-            measured += misses_of(shown.image, truth).squared;
-            predicted += shown.account.standard_error * shown.account.standard_error;
+            FrameSettings s = rays_a_pixel(v, 0, k, Method::path);
+            s.budget.rays = static_cast<std::uint64_t>(part * static_cast<double>(one.account.rays));
+            const Shown shown = render(renderer, v, s);
+            EXPECT_GE(shown.account.standard_error, 0) << part;
+            measured += misses_of(shown.image, truth).squared / 3;
+            predicted += shown.account.standard_error * shown.account.standard_error / 3;
+            used += static_cast<double>(shown.account.rays) / static_cast<double>(s.budget.rays) / 3;
+        }
+        EXPECT_LT(measured, before) << part;
+        if (part >= 0.5) {
+            EXPECT_LT(measured, 1.2 * of_one) << part;
         }
         const double ratio = std::sqrt(predicted / measured);
-        EXPECT_GE(ratio, 0.7) << rays;
-        EXPECT_LE(ratio, 1.5) << rays;
+        EXPECT_GE(ratio, 0.7) << part;
+        EXPECT_LE(ratio, 1.5) << part;
+        EXPECT_GE(used, 0.9) << part;
+        before = measured;
     }
 }
 

@@ -275,11 +275,12 @@ private:
             first = take_first_lattice(centre_);
         }
         if (first == 0) return;
+        if (first == 4 && !direct_alone_ && worth_sparse(2) && refine_coarse()) return;
         const int last = direct_alone_ ? 2 : 1;
         for (int stride = first; stride >= last; stride /= 2) {
             if (stride < first && !take_lattice(*frame_, stride)) return;
             account_.step = step_of(stride);
-            if (stride == 2 && !direct_alone_ && worth_sparse() && refine_sparse()) return;
+            if (stride == 2 && !direct_alone_ && worth_sparse(1) && refine_sparse()) return;
         }
     }
     /// The first image: one pixel in 2 x 2, whose batches are full, if that is expected to fit; else one in 4 x 4.
@@ -321,7 +322,7 @@ private:
     [[nodiscard]] Of cost_of_one() const { return by_centres_alone() ? Of::centres : Of::paths; }
     [[nodiscard]] double pixels_of_first_lattice() const {
         switch (budget_.kind) {
-            case BudgetKind::rays: return by_centres_alone() ? fitting_pixels() : 0;
+            case BudgetKind::rays: return 0;  // no batch that is not full costs more
             case BudgetKind::time:
                 return costs_.known(cost_of_one())
                            ? kMaxFirstTime * static_cast<double>(costs_.fitting(cost_of_one(), ns_left()))
@@ -331,9 +332,7 @@ private:
     }
     /// True if the lattice is complete.
     bool take_lattice(const Frame& f, int stride) {
-        const std::int64_t start = now_ns();
-        passes_.plan_fill(stride, false);
-        costs_.record(Of::reconstruction, passes_.pixels(), now_ns() - start);
+        plan_fill(stride);
         const PixelFill& plan = passes_.fill();
         for (Fill from{}; plan.total() > plan.total(from);) {
             const Fill to = next_fill(from);
@@ -344,34 +343,56 @@ private:
         }
         return true;
     }
-    [[nodiscard]] bool worth_sparse() const {
+    /// `lattices`: to be planned before.
+    [[nodiscard]] bool worth_sparse(std::uint64_t lattices) const {
         if (!settings_.mechanisms.sample_plan) return false;
+        if (budget_.kind == BudgetKind::passes && recorded_step() != FrameStep::sparse) return false;
         // If all light has noise, pixels that keep their centres because these show little contrast are too dark in
         // the mean. Their error remains below that of reconstruction, but not below that of centres everywhere.
         if (sample_.parts == LightParts::path && static_cast<double>(passes_.pixels()) <= fitting_pixels())
             return false;
         if (budget_.kind != BudgetKind::time) return true;
-        const std::int64_t plans = costs_.expected_ns(Of::reconstruction, passes_.pixels()) +
+        const std::int64_t plans = costs_.expected_ns(Of::reconstruction, lattices * passes_.pixels()) +
                                    costs_.expected_ns(Of::plan, passes_.pixels());
         return static_cast<double>(plans) <= kMaxSparsePlan * static_cast<double>(ns_left());
     }
+    /// After one pixel in 4 x 4: those in 2 x 2 where contrasts are large, then as `refine_sparse`. False: the pixels
+    /// that fit are too few.
+    bool refine_coarse() {
+        const double rest = static_cast<double>(passes_.pixels()) / 4 - static_cast<double>(account_.samples);
+        if (budget_.kind != BudgetKind::passes && fitting_pixels() < kMinCoarseFill * rest) return false;
+        if (!take_part(2)) return false;
+        account_.step = FrameStep::sparse;
+        refine_sparse();
+        return true;
+    }
     /// Once the contrasts of one pixel in 2 x 2 are known, more samples where these are large gain more than the
-    /// first samples of the pixels where they are small. False: replayed frame without.
+    /// first samples of the pixels where they are small.
     bool refine_sparse() {
-        if (budget_.kind == BudgetKind::passes && recorded_step() != FrameStep::sparse) return false;
-        if (fills_ == most_fills()) return true;
-        passes_.plan_fill(1, false);
+        if (take_part(1)) {
+            reconstruct();
+            refine(FrameStep::sparse);
+        }
+        return true;
+    }
+    /// Traces the pixels of a lattice that have the largest contrasts, with a part of what is left of the budget.
+    /// False if nothing was traced.
+    bool take_part(int stride) {
+        if (fills_ == most_fills()) return false;
+        plan_fill(stride);
+        const PixelFill& plan = passes_.fill();
         const double fitting = fitting_pixels();
-        const bool all = static_cast<double>(passes_.fill().total()) +
-                             (kAllCentresRays / 2 - 1) * static_cast<double>(passes_.pixels()) <=
-                         fitting;
+        const bool all = stride == 1 && static_cast<double>(plan.total()) + (kAllCentresRays / 2 - 1) *
+                                            static_cast<double>(passes_.pixels()) <= fitting;
         const Fill to = budget_.kind == BudgetKind::passes ? next_fill({})
                         : all                              ? PixelFill::all()
-                                                           : passes_.fill().reach({}, kSparseFill * fitting);
-        if (passes_.fill().total(to) == 0 || !take_planned(*frame_, {}, to, limit())) return true;
-        reconstruct();
-        refine(FrameStep::sparse);
-        return true;
+                                                           : plan.reach({}, kSparseFill * fitting);
+        return plan.total(to) > 0 && take_planned(*frame_, {}, to, limit());
+    }
+    void plan_fill(int stride) {
+        const std::int64_t start = now_ns();
+        passes_.plan_fill(stride, false);
+        costs_.record(Of::reconstruction, passes_.pixels(), now_ns() - start);
     }
     void reconstruct() {
         const auto lattices = static_cast<std::uint64_t>(passes_.fill().lattices_left());
@@ -390,7 +411,7 @@ private:
         // A batch that is not full takes as long.
         costs_.record(cost_of_one(), kLanes * pass.batches, pass.wall_ns);
         if (!account_for(pass, l, false)) return false;
-        rays_each_ = rays_each(pass);
+        if (!by_centres_alone()) rays_each_ = rays_each(pass);
         account_.passes[fills_++] =
             static_cast<std::uint32_t>(passes_.fill().total(to) - passes_.fill().total(from));
         return true;

@@ -259,7 +259,7 @@ PixelFill::PixelFill(const GBuffer& g_buffer)
 }
 
 void PixelFill::begin(std::span<const std::uint32_t> tiles) noexcept {
-    for (const std::uint32_t tile : tiles) traced_[tile] = 0;
+    for (const std::uint32_t tile : tiles) traced_[tile] = 0, guess_[tile].known = 0;
     compared_ = compared_coarser_ = {};
     has_contrasts_ = false;
     stride_ = 2;
@@ -396,8 +396,11 @@ void PixelFill::plan(GBuffer& g_buffer, std::span<const std::uint32_t> tiles, in
     compared_ = {};
     std::array<float, kParts> most{};
     for (const std::uint32_t tile : tiles) {
-        planned_[tile] = lattice(stride) & ~traced_[tile] & within(tile);
-        known_at_plan_[tile] = traced_[tile], changed_[tile] = 0, guess_[tile].known = 0;
+        const std::uint64_t coarser = first ? 0 : lattice(2 * stride) & within(tile);
+        guess_[tile].known &= coarser & ~traced_[tile];
+        known_at_plan_[tile] = traced_[tile] | coarser;
+        planned_[tile] = lattice(stride) & ~known_at_plan_[tile] & within(tile);
+        changed_[tile] = 0;
     }
     if (!first) {
         over_parts(tiles.size(), [&](std::size_t part, std::size_t begin, std::size_t end) {
@@ -481,7 +484,8 @@ void PixelFill::take(const GBuffer& g_buffer, std::span<const std::uint32_t> til
 
 /// Where nothing was traced since the last plan, the pixels are reconstructed already.
 void PixelFill::reconstruct(GBuffer& g_buffer, std::span<const std::uint32_t> tiles) {
-    for (const std::uint32_t tile : tiles) known_[tile] = traced_[tile], changed_[tile] = 0;
+    for (const std::uint32_t tile : tiles)
+        known_[tile] = traced_[tile] | (has_contrasts_ ? known_at_plan_[tile] : 0), changed_[tile] = 0;
     for (int stride = has_contrasts_ ? stride_ : stride_ / 2; stride >= 1; stride /= 2) {
         over_filled_tiles(tiles, [&](std::uint32_t tile) {
             const std::uint64_t missing = lattice(stride) & ~known_[tile] & within(tile);

@@ -2,7 +2,7 @@
 /// reconstruction of the others.
 ///
 /// Pixels are traced from lattice to lattice: one in 4 x 4 (left out if one in 2 x 2 fits), then one in 2 x 2, then
-/// all. Within a lattice they are traced in groups of one tile, as many as a batch of rays holds, because a batch
+/// all; what is left out of a lattice is reconstructed before the next finer one is planned. Within a lattice they are traced in groups of one tile, as many as a batch of rays holds, because a batch
 /// takes the same time whether it is full or not: those groups first whose pixels' neighbours in the coarser
 /// lattice differ most. A pixel that was not traced takes the mean of its traced neighbours, those beside it with
 /// twice the weight of the diagonal ones, and only those on one side of a silhouette: on the side with the larger
@@ -36,8 +36,8 @@ public:
         int level = 0;
     };
     /// Plans the pixels of the lattice of `stride` (4, 2 or 1) that are not traced yet: in a frame's first lattice
-    /// tile by tile in no order, else by contrast; the next coarser lattice is traced as a whole then, and the
-    /// planned pixels are reconstructed from it.
+    /// tile by tile in no order, else by contrast. The planned pixels are reconstructed from the next coarser
+    /// lattice, whose own pixels keep what they were reconstructed as if they were not traced.
     void plan(GBuffer& g_buffer, std::span<const std::uint32_t> tiles, int stride, bool first);
     /// The stage of all planned pixels.
     [[nodiscard]] static Stage all() noexcept { return {kLevels}; }

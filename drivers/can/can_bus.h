@@ -15,6 +15,8 @@
 
 namespace narpa {
 
+class ClientHub;  // client_hub.h
+
 /// Since the bus was opened.
 struct CanCounters {
     std::uint64_t received = 0;
@@ -59,6 +61,8 @@ public:
     /// How a client connects to this bus, for messages: "slcan: 127.0.0.1:29537 and /dev/pts/3".
     [[nodiscard]] virtual std::string description() const = 0;
     [[nodiscard]] virtual CanAddress address() const { return {}; }
+    /// The bus as a server of clients; null: it has none.
+    [[nodiscard]] virtual ClientHub* clients() noexcept { return nullptr; }
     [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
 
 protected:

@@ -81,6 +81,8 @@ public:
         return true;
     }
 
+    [[nodiscard]] ClientHub* clients() noexcept override { return this; }
+
     void note_commander() noexcept override {
         had_commander_ = true;
         Client& from = clients_[newest_.client];

@@ -13,7 +13,7 @@ namespace narpa {
 
 CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool lockstep)
     : bus_(bus),
-      hub_(dynamic_cast<ClientHub*>(&bus)),
+      hub_(bus.clients()),
       log_(log),
       lockstep_(lockstep),
       pace_(!lockstep && bus.recorded()),

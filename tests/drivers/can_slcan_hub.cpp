@@ -65,11 +65,8 @@ private:
     Descriptor fd_;
 };
 
-const ClientHub& clients_of(const CanBus& bus) {
-    return dynamic_cast<const ClientHub&>(bus);
-}
-std::uint64_t clients_left(const CanBus& bus) {
-    return clients_of(bus).clients_left();
+std::uint64_t clients_left(CanBus& bus) {
+    return bus.clients()->clients_left();
 }
 
 class SlcanHub : public testing::Test {
@@ -166,7 +163,7 @@ TEST_F(SlcanHub, EightClientsAndNotNine) {
 }
 
 TEST_F(SlcanHub, KnowsWhenAllThatCommandedHaveLeft) {
-    auto& hub = dynamic_cast<ClientHub&>(*hub_);
+    ClientHub& hub = *hub_->clients();
     EXPECT_FALSE(hub.has_clients());
     std::optional<Wire> one(std::in_place, port_), two(std::in_place, port_);
     Wire listener(port_);

@@ -356,8 +356,8 @@ private:
                                    costs_.expected_ns(Of::plan, passes_.pixels());
         return static_cast<double>(plans) <= kMaxSparsePlan * static_cast<double>(ns_left());
     }
-    /// After one pixel in 4 x 4: those in 2 x 2 where contrasts are large, then as `refine_sparse`. False: the pixels
-    /// that fit are too few.
+    /// After one pixel in 4 x 4: those in 2 x 2 where contrasts are large, then as `refine_sparse`. False: the
+    /// pixels that fit are too few.
     bool refine_coarse() {
         const double rest = static_cast<double>(passes_.pixels()) / 4 - static_cast<double>(account_.samples);
         if (budget_.kind != BudgetKind::passes && fitting_pixels() < kMinCoarseFill * rest) return false;
@@ -382,8 +382,9 @@ private:
         plan_fill(stride);
         const PixelFill& plan = passes_.fill();
         const double fitting = fitting_pixels();
-        const bool all = stride == 1 && static_cast<double>(plan.total()) + (kAllCentresRays / 2 - 1) *
-                                            static_cast<double>(passes_.pixels()) <= fitting;
+        const bool all = stride == 1 && static_cast<double>(plan.total()) +
+                                                (kAllCentresRays / 2 - 1) * static_cast<double>(passes_.pixels()) <=
+                                            fitting;
         const Fill to = budget_.kind == BudgetKind::passes ? next_fill({})
                         : all                              ? PixelFill::all()
                                                            : plan.reach({}, kSparseFill * fitting);

@@ -512,8 +512,9 @@ void PixelFill::find_errors() noexcept {
         error = {kFillErrorOfContrast, 0};
         for (const Comparison& c : {compared_.first[octave], with_others, coarser}) {
             if (c.pixels < kMinComparisons) continue;
-            error =
-                c.contrasts > 0 ? OctaveError{c.squares / c.contrasts, 0} : OctaveError{0, c.squares / c.pixels};
+            // The last octave has all contrasts down to 0: what few of them show does not scale with the others'.
+            error = octave + 1 < kOctaves && c.contrasts > 0 ? OctaveError{c.squares / c.contrasts, 0}
+                                                             : OctaveError{0, c.squares / c.pixels};
             break;
         }
     }

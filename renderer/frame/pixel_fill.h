@@ -2,11 +2,12 @@
 /// reconstruction of the others.
 ///
 /// Pixels are traced from lattice to lattice: one in 4 x 4 (left out if one in 2 x 2 fits), then one in 2 x 2, then
-/// all; what is left out of a lattice is reconstructed before the next finer one is planned. Within a lattice they are traced in groups of one tile, as many as a batch of rays holds, because a batch
-/// takes the same time whether it is full or not: those groups first whose pixels' neighbours in the coarser
-/// lattice differ most. A pixel that was not traced takes the mean of its traced neighbours, those beside it with
-/// twice the weight of the diagonal ones, and only those on one side of a silhouette: on the side with the larger
-/// weight, by a hash of the pixel where both are equal, so that silhouettes do not move on average.
+/// all; what is left out of a lattice is reconstructed before the next finer one is planned. Within a lattice they
+/// are traced in groups of one tile, as many as a batch of rays holds, because a batch takes the same time whether
+/// it is full or not: those groups first whose pixels' neighbours in the coarser lattice differ most. A pixel that
+/// was not traced takes the mean of its traced neighbours, those beside it with twice the weight of the diagonal
+/// ones, and only those on one side of a silhouette: on the side with the larger weight, by a hash of the pixel
+/// where both are equal, so that silhouettes do not move on average.
 ///
 /// The error of reconstruction is measured: each traced pixel is compared with what its neighbours in the coarser
 /// lattice say of it; a few groups come first whatever their contrast. An edge has no scale, so pixels of equal

@@ -121,9 +121,9 @@ inline constexpr double kPartNotNoise = 0.5;
 /// This part of what is left after one pixel in 2 x 2 goes to further pixels, the rest to further samples; with
 /// this many rays per pixel in Sun-only direct lighting, or half as many samples, all centres are traced instead.
 inline constexpr double kSparseFill = 0.5, kAllCentresRays = 3;
-/// After one pixel in 4 x 4 the same, if this part of those in 2 x 2 fits. RMSE over that of one sample per pixel, at
-/// 1/8, 1/6, 1/4 of its rays: docking at 50 s 1.27, 1.06, 0.85, if those in 2 x 2 are traced first 1.47, 1.46, 1.45;
-/// at 1/14, where 5 % fit, 2.28 and 1.89.
+/// After one pixel in 4 x 4 the same, if this part of those in 2 x 2 fits. RMSE over that of one sample per pixel,
+/// at 1/8, 1/6, 1/4 of its rays: docking at 50 s 1.27, 1.06, 0.85, if those in 2 x 2 are traced
+/// first 1.47, 1.46, 1.45; at 1/14, where 5 % fit, 2.28 and 1.89.
 inline constexpr double kMinCoarseFill = 0.15;
 /// The plans of these samples may take this part of the time that is left. Runs of docking.
 inline constexpr double kMaxSparsePlan = 0.4;

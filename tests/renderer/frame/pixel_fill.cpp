@@ -100,6 +100,29 @@ TEST(PixelFill, ErrorFallsAtEveryStepAndIsKnown) {
     }
 }
 
+/// A sphere seen from far away, whose neighbouring pixels hardly differ, with bars that no coarse lattice shows.
+BudgetView bars_on_a_smooth_ground(double shift) {
+    Scene s;
+    s.materials.push_back(lambert(0.5f));
+    add_sphere(s, 3e6, {0, 0, -3e6});
+    for (int i = 0; i < 12; ++i)
+        add_mesh(s, box(0.05, 0.05, 0.5), {Quat{}, {0.53 * i - 3 + shift, 0.41 * i - 2.5, 0}});
+    add_sun(s, {0.2, 0.1, 1});
+    return {std::move(s), 128, 96, 128, looking({0, 0, 10}, {0, 0, 0}, {0, 1, 0})};
+}
+
+TEST(PixelFill, DetailsOnSmoothGroundAreNotTakenForItsError) {
+    double largest = 0;
+    for (int i = 0; i < 12; ++i) {
+        const BudgetView v = bars_on_a_smooth_ground(0.013 * i);
+        const std::vector<double> truth = truth_of(v, 64);
+        const Shown shown = render(v, rays_a_pixel(v, 1, static_cast<std::uint32_t>(i)));
+        largest =
+            std::max(largest, shown.account.standard_error / std::sqrt(misses_of(shown.image, truth).squared));
+    }
+    EXPECT_LT(largest, 3.8);
+}
+
 TEST(PixelFill, HalfTheRaysOfOneSampleAPixelHaveNoLargerError) {
     const BudgetView v = craft_over_a_globe(200, 150);
     const std::vector<double> truth = truth_of(v, 512);

@@ -156,7 +156,7 @@ TEST_F(ReplayTest, ByPathsToo) {
 
 TEST_F(ReplayTest, FramesOfEveryStepRepeat) {
     std::size_t steps = 0;
-    for (const char* budget : {"budget_rays = 400", "budget_rays = 5000", "budget_rays = 40000"}) {
+    for (const char* budget : {"budget_rays = 290", "budget_rays = 5000", "budget_rays = 40000"}) {
         const std::string log = run(scene_with(budget, kDetector), 2);
         EXPECT_EQ(expect_repeats(log), 2U) << budget;
         const auto frames = read_ledger_log(log + "/nav.ledger.csv");

@@ -19,10 +19,9 @@ Status check_light(const Scene& s, const Light& l) {
 }  // namespace
 
 Result<RenderScene> RenderScene::create(const Scene& scene, int threads,
-                                        const std::vector<std::shared_ptr<const Shape>>& shapes,
                                         std::unique_ptr<const Background> background,
                                         std::unique_ptr<const Medium> medium) {
-    auto tracer = Tracer::create(scene, threads, shapes);
+    auto tracer = Tracer::create(scene, threads);
     if (!tracer) return tracer.error();
     for (const Light& l : scene.lights)
         if (const Status good = check_light(scene, l); !good) return good.error();

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "renderer/atmosphere/air.h"
+#include "renderer/geometry/shape_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -39,12 +40,12 @@ constexpr TableKey kSkyRows[]{
     {"up", rows::direction()},
 };
 
-/// Radius of the sphere with the body's volume; nullopt for a mesh.
+/// Radius of the sphere with the body's volume; nullopt for other shapes.
 std::optional<double> mean_radius_m(const Body& body) {
-    if (const auto* s = std::get_if<Sphere>(&body.shape)) return s->radius_m;
-    if (const auto* e = std::get_if<Ellipsoid>(&body.shape))
-        return std::cbrt(e->semi_axes_m.x * e->semi_axes_m.y * e->semi_axes_m.z);
-    return std::nullopt;
+    const auto axes = semi_axes_m(body);
+    if (!axes) return std::nullopt;
+    const auto [a, b, c] = *axes;
+    return a == b && b == c ? a : std::cbrt(a * b * c);  // a cubic root rounds
 }
 
 /// Index of the body that is named; -1 and a problem otherwise.
@@ -74,8 +75,7 @@ void read_ground(TableReader& table, const Body& body, const SceneReading& readi
         table.require("ground_radius_m", "the radius of the ground about the body's origin: the body is no sphere");
     air.ground_radius_m = own.value_or(radius.value_or(air.ground_radius_m));
     if (own && !table.has("ground_albedo")) {
-        const int material = std::holds_alternative<Sphere>(body.shape) ? std::get<Sphere>(body.shape).material
-                                                                        : std::get<Ellipsoid>(body.shape).material;
+        const int material = std::get<ExactShape>(body.shape).material;
         const Material& m = reading.scene.materials[static_cast<std::size_t>(material)];
         if (m.kind == &kinds::lambert && !names_texture(reading, material))
             air.ground_albedo = std::min(1.0, static_cast<double>(mean_band(m.diffuse)));

@@ -23,6 +23,7 @@
 namespace narpa {
 
 class LidarModel;
+class Sky;
 struct ShapeKind;
 
 /// Triangles in the body's own frame, metres. Degenerate and non-finite ones were dropped when it was read.
@@ -162,7 +163,7 @@ struct Scene {
     std::optional<StarField> stars{};
     Rgb ambient{};  ///< radiance arriving from everywhere, W m^-2 sr^-1 a band
     std::optional<Atmosphere> atmosphere{};
-    std::optional<AnalyticSky> sky{};
+    std::shared_ptr<const Sky> sky{};  ///< null: none; kinds: renderer/light/sky_kind.h
     std::vector<Light> lights;
     std::vector<Body> bodies;
     std::vector<Mesh> meshes;

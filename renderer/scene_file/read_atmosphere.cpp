@@ -13,14 +13,11 @@ namespace {
 
 using Planet = AirDescription::Planet;
 constexpr std::array<std::string_view, 2> kPlanetNames{"earth", "mars"};
-constexpr std::array<std::string_view, 1> kSkyNames{"hosek-wilkie"};
 constexpr Range kAirHeight{.low = 100, .high = 1e5};
-constexpr TableKey kTurbidityRow{"turbidity", rows::number({.low = 1, .high = 10})},
-    kGroundAlbedoRow{"ground_albedo", rows::number(kUnit)};
 constexpr TableKey kAtmosphereRows[]{
     {"body", rows::text(), "the name of the [[body]] that the air surrounds"},
     {"planet", rows::choice<kPlanetNames>()},
-    kTurbidityRow,
+    {"turbidity", rows::number({.low = 1, .high = 10})},
     {"ozone_du", rows::number({.low = 0, .high = 1000})},
     {"dust_depth", rows::number({.low = 0, .high = 10})},
     {"top_m", rows::number({.low = 1e4, .high = 5e5})},
@@ -28,18 +25,11 @@ constexpr TableKey kAtmosphereRows[]{
     {"aerosol_height_m", rows::number(kAirHeight)},
     {"gas_amount", rows::number({.low = 0, .high = 100})},
     {"lidar_ratio_sr", rows::number({.low = 1, .high = 1000})},
-    kGroundAlbedoRow,
+    {"ground_albedo", rows::number(kUnit)},
     {"ground_radius_m", rows::number({.low = 1e5, .high = 1e9})},
     {"samples_per_band", rows::integer(1, Air::kMaxPerBand)},
     {"steps", rows::integer(4, 32)},
 };
-constexpr TableKey kSkyRows[]{
-    {"model", rows::choice<kSkyNames>(), "\"hosek-wilkie\""},
-    kTurbidityRow,
-    kGroundAlbedoRow,
-    {"up", rows::direction()},
-};
-
 /// Radius of the sphere with the body's volume; nullopt for other shapes.
 std::optional<double> mean_radius_m(const Body& body) {
     const auto axes = semi_axes_m(body);
@@ -100,7 +90,11 @@ void read_air(TableReader& table, AirDescription& air) {
     table.read("dust_depth", air.aerosol_depth);
 }
 
-void read_planet_air(TableReader& root, SceneReading& reading) {
+}  // namespace
+
+constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows};
+
+void read_atmosphere(TableReader& root, SceneReading& reading) {
     auto table = root.table("atmosphere");
     if (!table) return;
     Atmosphere a;
@@ -115,36 +109,6 @@ void read_planet_air(TableReader& root, SceneReading& reading) {
     table->read("steps", a.steps);
     table->finish();
     if (a.body >= 0) scene.atmosphere = a;
-}
-
-void read_sky(TableReader& root, SceneReading& reading) {
-    auto table = root.table("sky");
-    if (!table) return;
-    (void)table->word("model");
-    AnalyticSky sky;
-    sky.up = table->direction("up").value_or(sky.up);
-    table->read("turbidity", sky.turbidity);
-    table->read("ground_albedo", sky.ground_albedo);
-    table->finish();
-    if (!reading.scene.sun) {
-        root.fail("sky", "a sky is lit by the Sun, expected a [sun]");
-    } else if (dot(sky.up, normalized(reading.scene.sun->direction)) < 0) {
-        root.fail("sky",
-                  "the Sun stands below this sky's horizon, where its model ends; expected a Sun above, or an "
-                  "[atmosphere], which has twilight");
-    }
-    for (const std::string_view other : {"atmosphere", "ambient"})
-        root.refuse(other, "the scene has a [sky] too, expected one of the two");
-    reading.scene.sky = sky;
-}
-
-}  // namespace
-
-constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows}, kSkyKeys{.rows = kSkyRows};
-
-void read_atmosphere(TableReader& root, SceneReading& reading) {
-    read_planet_air(root, reading);
-    read_sky(root, reading);
 }
 
 }  // namespace narpa

@@ -1,25 +1,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "renderer/atmosphere/air.h"
+#include "renderer/atmosphere/air_kind.h"
 #include "renderer/geometry/shape_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
 namespace {
 
-using Planet = AirDescription::Planet;
-constexpr std::array<std::string_view, 2> kPlanetNames{"earth", "mars"};
 constexpr Range kAirHeight{.low = 100, .high = 1e5};
 constexpr TableKey kAtmosphereRows[]{
     {"body", rows::text(), "the name of the [[body]] that the air surrounds"},
-    {"planet", rows::choice<kPlanetNames>()},
-    {"turbidity", rows::number({.low = 1, .high = 10})},
-    {"ozone_du", rows::number({.low = 0, .high = 1000})},
-    {"dust_depth", rows::number({.low = 0, .high = 10})},
+    {"planet", rows::kind("earth")},
     {"top_m", rows::number({.low = 1e4, .high = 5e5})},
     {"gas_height_m", rows::number(kAirHeight)},
     {"aerosol_height_m", rows::number(kAirHeight)},
@@ -30,6 +24,7 @@ constexpr TableKey kAtmosphereRows[]{
     {"samples_per_band", rows::integer(1, Air::kMaxPerBand)},
     {"steps", rows::integer(4, 32)},
 };
+
 /// Radius of the sphere with the body's volume; nullopt for other shapes.
 std::optional<double> mean_radius_m(const Body& body) {
     const auto axes = semi_axes_m(body);
@@ -79,20 +74,17 @@ void read_air(TableReader& table, AirDescription& air) {
     table.read("aerosol_height_m", air.aerosol_height_m);
     table.read("gas_amount", air.gas_amount);
     table.read("lidar_ratio_sr", air.aerosol_lidar_ratio_sr);
-    if (air.planet == Planet::earth) {
-        table.refuse("dust_depth", "belongs to planet = \"mars\"; the Earth's aerosol has a \"turbidity\"");
-    } else {
-        for (const std::string_view key : {"turbidity", "ozone_du"})
-            table.refuse(key, "belongs to planet = \"earth\"; the dust of Mars has a \"dust_depth\"");
-    }
-    table.read("turbidity", air.turbidity);
-    table.read("ozone_du", air.ozone_du);
-    table.read("dust_depth", air.aerosol_depth);
+    air.kind->read(table, air);
 }
 
 }  // namespace
 
-constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows};
+constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows, .kinds = [] {
+                                              std::vector<TableKind> kinds;
+                                              for (const AirKind* k : air_kinds())
+                                                  kinds.push_back({k->name, k->keys});
+                                              return kinds;
+                                          }};
 
 void read_atmosphere(TableReader& root, SceneReading& reading) {
     auto table = root.table("atmosphere");
@@ -100,9 +92,7 @@ void read_atmosphere(TableReader& root, SceneReading& reading) {
     Atmosphere a;
     Scene& scene = reading.scene;
     a.body = planet_body(*table, scene.bodies);
-    Planet planet = Planet::earth;
-    table->read("planet", planet);
-    a.air = planet == Planet::earth ? earth_air() : mars_air();
+    a.air = air_kinds()[table->kind().value_or(0)]->standard();
     if (a.body >= 0) read_ground(*table, scene.bodies[static_cast<std::size_t>(a.body)], reading, a.air);
     read_air(*table, a.air);
     table->read("samples_per_band", a.samples_per_band);

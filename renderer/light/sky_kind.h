@@ -37,6 +37,9 @@ struct SkyKind {
     std::shared_ptr<const Sky> (*read)(TableReader& table) = nullptr;  ///< never returns null
 };
 
+/// All kinds, in the order of the documents.
+[[nodiscard]] std::span<const SkyKind* const> sky_kinds();
+
 extern const TableKeys kSkyKeys;
 /// [sky]; the Sun comes first.
 void read_sky(TableReader& root, Scene& scene);

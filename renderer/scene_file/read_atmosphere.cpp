@@ -79,12 +79,7 @@ void read_air(TableReader& table, AirDescription& air) {
 
 }  // namespace
 
-constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows, .kinds = [] {
-                                              std::vector<TableKind> kinds;
-                                              for (const AirKind* k : air_kinds())
-                                                  kinds.push_back({k->name, k->keys});
-                                              return kinds;
-                                          }};
+constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows, .kinds = kinds_of<air_kinds>};
 
 void read_atmosphere(TableReader& root, SceneReading& reading) {
     auto table = root.table("atmosphere");

@@ -32,6 +32,7 @@
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/scenario/scenario.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/geometry/shape_kind.h"
 #include "renderer/keys/json_schema.h"
 #include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/lidar_description.h"
@@ -113,12 +114,18 @@ std::map<std::string_view, int> material_kinds(const Scene& scene) {
 }
 
 nlohmann::json describe_shape(const Scene& scene, const Body& body) {
-    if (const auto* sphere = std::get_if<Sphere>(&body.shape)) return {{"sphere_radius_m", sphere->radius_m}};
-    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&body.shape)) {
-        const Vec3& axes = ellipsoid->semi_axes_m;
-        return {{"ellipsoid_semi_axes_m", {axes.x, axes.y, axes.z}}};
+    if (const int* const mesh = std::get_if<int>(&body.shape))
+        return {{"triangles", scene.meshes[static_cast<std::size_t>(*mesh)].faces.size()}};
+    const auto& [kind, values, material] = std::get<ExactShape>(body.shape);
+    nlohmann::json out;
+    auto value = values.begin();
+    for (const TableKey& key : kind->keys.rows) {
+        const int count = key.value.counts[0];  // 0: a number
+        auto& of_key = out[fmt::format("{}_{}", kind->name, key.name)];
+        if (count == 0) of_key = *value++;
+        for (int i = 0; i < count; ++i) of_key.push_back(*value++);
     }
-    return {{"triangles", scene.meshes[static_cast<std::size_t>(std::get<int>(body.shape))].faces.size()}};
+    return out;
 }
 
 std::string_view kind_name(const Light& light) {

@@ -37,6 +37,10 @@ struct SpectralNode {
 /// a blackbody of 5772 K.
 [[nodiscard]] std::vector<SpectralNode> spectral_nodes(int per_band);
 
+/// Ozone: the column above a height is a logistic function of the height, A. Lacis, J. Hansen, J. Atmos. Sci. 31,
+/// 1974.
+inline constexpr double kOzoneMiddle_m = 20'000, kOzoneWidth_m = 5'000;
+
 /// Relative densities: gas and aerosol relative to the surface, ozone relative to its maximum.
 struct AirDensities {
     float gas = 0, aerosol = 0, ozone = 0;

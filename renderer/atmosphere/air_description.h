@@ -1,14 +1,14 @@
 /// renderer/atmosphere/air_description.h - what an atmosphere is made of, as a scene describes it.
 #pragma once
 
-#include <cstdint>
-
 namespace narpa {
+
+struct AirKind;
+extern const AirKind kEarthAir;
 
 /// SI units; heights above the planet's surface, taken as a sphere.
 struct AirDescription {
-    enum class Planet : std::uint8_t { earth, mars };
-    Planet planet = Planet::earth;
+    const AirKind* kind = &kEarthAir;  ///< never null; kinds: air_kind.h
     double ground_radius_m = 6'371'000;
     double top_m = 60'000;          ///< vacuum above
     double gas_height_m = 8449.63;  ///< scale height; gives Bodhaine's optical depth for Earth

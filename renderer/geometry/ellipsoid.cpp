@@ -153,4 +153,13 @@ std::unique_ptr<const EmissiveSurface> EllipsoidShape::emission(const Scene& sce
     return std::make_unique<EllipsoidEmission>(semi_axes_m_, radius_m_, radiance);
 }
 
+Vec3 ellipsoid_axes_m(std::span<const double> values) {
+    return values.size() == 1 ? Vec3{values[0], values[0], values[0]} : Vec3{values[0], values[1], values[2]};
+}
+
+std::shared_ptr<const Shape> make_ellipsoid(std::span<const double> values, int material, bool textured) {
+    if (!std::ranges::all_of(values, [](double x) { return x > 0 && std::isfinite(x); })) return nullptr;
+    return std::make_shared<EllipsoidShape>(ellipsoid_axes_m(values), material, textured);
+}
+
 }  // namespace narpa

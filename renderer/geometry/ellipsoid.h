@@ -12,7 +12,7 @@
 #include <numbers>
 
 #include "base/constants.h"
-#include "renderer/geometry/shape.h"
+#include "renderer/geometry/shape_kind.h"
 #include "renderer/geometry/sphere_roots.h"
 
 namespace narpa {
@@ -82,5 +82,34 @@ private:
     int material_;
     bool textured_;
 };
+
+inline constexpr TableKey kSphereRows[]{{"radius_m", rows::number(kShapeLength), "a number > 0"}};
+inline constexpr TableKey kEllipsoidRows[]{
+    {"semi_axes_m", rows::vec3(kShapeLength), "[a, b, c], the half lengths along the body's x, y and z"}};
+/// `values`: a radius, or three semi-axes.
+[[nodiscard]] std::shared_ptr<const Shape> make_ellipsoid(std::span<const double> values, int material,
+                                                          bool textured);
+[[nodiscard]] Vec3 ellipsoid_axes_m(std::span<const double> values);
+inline constexpr ShapeKind kSphere{.name = "sphere",
+                                   .example = "{radius_m = ...}",
+                                   .keys = {.rows = kSphereRows},
+                                   .expected = "the radius of a sphere is a positive length in metres",
+                                   .make = make_ellipsoid,
+                                   .semi_axes_m = ellipsoid_axes_m};
+inline constexpr ShapeKind kEllipsoid{
+    .name = "ellipsoid",
+    .example = "{semi_axes_m = [a, b, c]}",
+    .keys = {.rows = kEllipsoidRows},
+    .expected = "the semi-axes of an ellipsoid are three positive lengths in metres",
+    .make = make_ellipsoid,
+    .semi_axes_m = ellipsoid_axes_m};
+
+[[nodiscard]] inline ExactShape exact_sphere(double radius_m, int material = 0) {
+    return {&kSphere, {radius_m}, material};
+}
+/// (x/a)^2 + (y/b)^2 + (z/c)^2 = 1.
+[[nodiscard]] inline ExactShape exact_ellipsoid(const Vec3& semi_axes_m, int material = 0) {
+    return {&kEllipsoid, {semi_axes_m.x, semi_axes_m.y, semi_axes_m.z}, material};
+}
 
 }  // namespace narpa

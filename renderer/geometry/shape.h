@@ -1,8 +1,7 @@
 /// renderer/geometry/shape.h - interface of a body's surface to the ray tracer.
 ///
-/// A kind of shape is a class derived from Shape, in its own files. Only make_shapes.cpp, which makes them from the
-/// scene, names the kinds. Everything here is in the frame of the body, in metres. One virtual call serves a batch
-/// of rays.
+/// A kind of shape is a class derived from Shape, in its own files; those that scenes name: shape_kind.h.
+/// Everything here is in the frame of the body, in metres. One virtual call serves a batch of rays.
 #pragma once
 
 #include <array>

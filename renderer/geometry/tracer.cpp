@@ -18,7 +18,7 @@ Status check_textures(const Scene& s, const Material& m) {
 
 }  // namespace
 
-Status Tracer::Impl::build(const Scene& s, int threads, const Shapes& given) {
+Status Tracer::Impl::build(const Scene& s, int threads) {
     scene = &s;
     device.reset(rtcNewDevice(nullptr));
     if (!device)
@@ -28,7 +28,7 @@ Status Tracer::Impl::build(const Scene& s, int threads, const Shapes& given) {
             0,
             0,
             ErrorKind::failed};
-    auto made = make_shapes(s, given, device.get(), threads);
+    auto made = make_shapes(s, device.get(), threads);
     if (!made) return made.error();
     shapes = *std::move(made);
     all_bodies.resize(shapes.size());
@@ -38,10 +38,9 @@ Status Tracer::Impl::build(const Scene& s, int threads, const Shapes& given) {
     return Ok{};
 }
 
-Result<Tracer> Tracer::create(const Scene& scene, int threads,
-                              const std::vector<std::shared_ptr<const Shape>>& shapes) {
+Result<Tracer> Tracer::create(const Scene& scene, int threads) {
     auto impl = std::make_unique<Impl>();
-    if (const Status good = impl->build(scene, threads, shapes); !good) return good.error();
+    if (const Status good = impl->build(scene, threads); !good) return good.error();
     return Tracer(std::move(impl));
 }
 Tracer::Tracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -9,7 +9,6 @@
 
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "base/result.h"
 #include "renderer/geometry/body_poses.h"
@@ -21,10 +20,8 @@ namespace narpa {
 
 class Tracer {
 public:
-    /// `scene` must outlive the tracer. `threads` bounds the threads that build; 0 is all. `shapes[i]`, if present
-    /// and not null, replaces Body::shape of body i: for kinds that scene files do not have.
-    static Result<Tracer> create(const Scene& scene, int threads = 0,
-                                 const std::vector<std::shared_ptr<const Shape>>& shapes = {});
+    /// `scene` must outlive the tracer. `threads` bounds the threads that build; 0 is all.
+    static Result<Tracer> create(const Scene& scene, int threads = 0);
     template <class... Rest>
     static Result<Tracer> create(const Scene&& temporary, Rest&&...) = delete;
     Tracer(Tracer&&) noexcept;

@@ -11,9 +11,8 @@ namespace narpa {
 /// One for each body; bodies with the same mesh share theirs.
 using Shapes = std::vector<std::shared_ptr<const Shape>>;
 
-/// Entries of `given` that are not null replace the scene's shapes of the first bodies. The scene must outlive the
-/// shapes. `threads` bounds the threads that build; 0 is all.
-[[nodiscard]] Result<Shapes> make_shapes(const Scene& scene, const Shapes& given, RTCDevice device, int threads);
+/// The scene must outlive the shapes. `threads` bounds the threads that build; 0 is all.
+[[nodiscard]] Result<Shapes> make_shapes(const Scene& scene, RTCDevice device, int threads);
 
 struct WorldRays;
 struct NearestHits;
@@ -24,7 +23,7 @@ struct Tracer::Impl {
     Shapes shapes;                    ///< one for each body
     std::vector<std::uint32_t> all_bodies;
 
-    Status build(const Scene& s, int threads, const Shapes& given);
+    Status build(const Scene& s, int threads);
 
     class SecondaryRays;
     /// Nearest hits of the `wanted` lanes among these bodies.

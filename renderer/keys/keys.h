@@ -103,6 +103,14 @@ std::vector<std::string_view> words_of() {
     return words;
 }
 
+/// The kinds of a concept's table, a function that returns pointers to rows with a name and keys.
+template <auto table>
+std::vector<TableKind> kinds_of() {
+    std::vector<TableKind> kinds;
+    for (const auto* row : table()) kinds.push_back({row->name, row->keys});
+    return kinds;
+}
+
 namespace rows {
 
 using Type = KeyValue::Type;

@@ -258,6 +258,20 @@ std::optional<std::vector<double>> TableReader::numbers(std::string_view key) {
     return numbers(key, row(key, KeyValue::Type::numbers));
 }
 
+std::vector<double> TableReader::values(std::span<const TableKey> keys, double otherwise) {
+    std::vector<double> all;
+    for (const TableKey& key : keys) {
+        if (key.value.type == KeyValue::Type::numbers) {
+            const auto count = static_cast<std::size_t>(key.value.counts[0]);
+            const auto array = numbers(key.name).value_or(std::vector<double>(count, otherwise));
+            all.insert(all.end(), array.begin(), array.end());
+        } else {
+            all.push_back(number(key.name).value_or(otherwise));
+        }
+    }
+    return all;
+}
+
 std::optional<Vec3> TableReader::vec3(std::string_view key) {
     return vec3(key, row(key, KeyValue::Type::numbers).range);
 }

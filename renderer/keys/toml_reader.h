@@ -89,6 +89,9 @@ public:
     std::optional<std::vector<std::string>> texts(std::string_view key);
     /// An array of one of these counts.
     std::optional<std::vector<double>> numbers(std::string_view key);
+    /// The numbers of these keys, each of one number or an array, in order. An absent or wrong number is
+    /// `otherwise`; such an array has the first of its row's counts.
+    std::vector<double> values(std::span<const TableKey> keys, double otherwise);
     std::optional<Vec3> vec3(std::string_view key);
     std::optional<Vec3> vec3(std::string_view key, const Range& range);
     /// A unit vector from one of any length but 0.

@@ -6,17 +6,48 @@
 
 #include "base/constants.h"
 #include "renderer/atmosphere/scattered_light.h"
+#include "renderer/keys/toml_reader.h"
 
 namespace narpa {
 namespace {
 
 constexpr int kSkyBands = 4, kSkySteps = 32;
 
-double elevation_of(const Scene& scene) {
-    return std::asin(std::clamp(dot(normalized(scene.sky->up), normalized(scene.sun->direction)), 0.0, 1.0));
+constexpr TableKey kHosekWilkieRows[]{
+    {"turbidity", rows::number({.low = 1, .high = 10})},
+    {"ground_albedo", rows::number(kUnit)},
+    {"up", rows::direction()},
+};
+
+std::shared_ptr<const Sky> read_analytic_sky(TableReader& table) {
+    AnalyticSky sky;
+    sky.up = table.direction("up").value_or(sky.up);
+    table.read("turbidity", sky.turbidity);
+    table.read("ground_albedo", sky.ground_albedo);
+    return std::make_shared<AnalyticSky>(sky);
+}
+
+double elevation_of(const AnalyticSky& sky, const Sun& sun) {
+    return std::asin(std::clamp(dot(normalized(sky.up), normalized(sun.direction)), 0.0, 1.0));
 }
 
 }  // namespace
+
+constinit const SkyKind kHosekWilkie{"hosek-wilkie", kHosekWilkieRows, read_analytic_sky};
+
+std::string AnalyticSky::problem(const Scene& scene) const {
+    if (!scene.sun) return "a sky is lit by the Sun, expected a [sun]";
+    if (dot(up, normalized(scene.sun->direction)) < 0)
+        return "the Sun stands below this sky's horizon, where its model ends; expected a Sun above, or an "
+               "[atmosphere], which has twilight";
+    return {};
+}
+
+SkyLight AnalyticSky::make(const Scene& scene) const {
+    if (!scene.sun) return {};
+    return {std::make_unique<AnalyticSkyBackground>(*this, *scene.sun),
+            std::make_unique<SunThroughAir>(*this, *scene.sun)};
+}
 
 Rgb sunlight_transmittance(double turbidity, double sun_elevation_rad) {
     const Air air(earth_air(turbidity), kSkyBands);
@@ -25,11 +56,11 @@ Rgb sunlight_transmittance(double turbidity, double sun_elevation_rad) {
         air, columns_along(air, PanelRule(kSkySteps), {0, 0, air.ground_radius_m()}, direction, kInfinity));
 }
 
-AnalyticSkyBackground::AnalyticSkyBackground(const Scene& scene)
-    : frame_(normalized(scene.sky->up)),
-      model_(scene.sky->turbidity, scene.sky->ground_albedo, elevation_of(scene)),
-      irradiance_(static_cast<float>(scene.sun->irradiance_w_m2)),
-      to_sun_(frame_.to_local(normalized(scene.sun->direction))),
+AnalyticSkyBackground::AnalyticSkyBackground(const AnalyticSky& given, const Sun& sun)
+    : frame_(normalized(given.up)),
+      model_(given.turbidity, given.ground_albedo, elevation_of(given, sun)),
+      irradiance_(static_cast<float>(sun.irradiance_w_m2)),
+      to_sun_(frame_.to_local(normalized(sun.direction))),
       row_end_(kRows),
       column_end_(kRows * kColumns),
       density_(kRows * kColumns) {
@@ -56,10 +87,10 @@ AnalyticSkyBackground::AnalyticSkyBackground(const Scene& scene)
     for (double& d : density_) d /= all * kCell;
     constexpr auto kInvPi = static_cast<float>(std::numbers::inv_pi);
     ambient_ = kInvPi * horizontal;
-    const double elevation = elevation_of(scene);
-    const Rgb direct = static_cast<float>(std::sin(elevation)) * irradiance_ *
-                       sunlight_transmittance(scene.sky->turbidity, elevation);
-    ground_ = static_cast<float>(scene.sky->ground_albedo) * kInvPi * (horizontal + direct);
+    const double elevation = elevation_of(given, sun);
+    const Rgb direct =
+        static_cast<float>(std::sin(elevation)) * irradiance_ * sunlight_transmittance(given.turbidity, elevation);
+    ground_ = static_cast<float>(given.ground_albedo) * kInvPi * (horizontal + direct);
 }
 
 Rgb AnalyticSkyBackground::sky(const Vec3& local) const noexcept {
@@ -94,10 +125,10 @@ double AnalyticSkyBackground::pdf(const Vec3& direction) const noexcept {
     return density_[i * kColumns + j];
 }
 
-SunThroughAir::SunThroughAir(const Scene& scene)
-    : to_sun_(normalized(scene.sun->direction)),
-      cosine_(std::cos(0.5 * scene.sun->angular_diameter_rad) - 1e-9),
-      transmittance_(sunlight_transmittance(scene.sky->turbidity, elevation_of(scene))) {}
+SunThroughAir::SunThroughAir(const AnalyticSky& sky, const Sun& sun)
+    : to_sun_(normalized(sun.direction)),
+      cosine_(std::cos(0.5 * sun.angular_diameter_rad) - 1e-9),
+      transmittance_(sunlight_transmittance(sky.turbidity, elevation_of(sky, sun))) {}
 
 Rgb SunThroughAir::transmittance_of_ray(const Ray& ray, double range_m) const noexcept {
     if (range_m != kInfinity || dot(ray.direction, to_sun_) < cosine_) return {1, 1, 1};

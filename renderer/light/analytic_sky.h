@@ -5,19 +5,29 @@
 #include <vector>
 
 #include "renderer/atmosphere/hosek_wilkie.h"
-#include "renderer/light/background.h"
-#include "renderer/light/medium.h"
+#include "renderer/light/sky_kind.h"
 #include "renderer/material/directions.h"
-#include "renderer/scene/scene.h"
 
 namespace narpa {
+
+/// Hosek and Wilkie's clear sky, seen from flat ground.
+class AnalyticSky final : public Sky {
+public:
+    Vec3 up{0, 0, 1};  ///< world
+    double turbidity = 3;
+    double ground_albedo = 0.1;
+
+    [[nodiscard]] std::string problem(const Scene& scene) const override;
+    /// Nothing without a Sun.
+    [[nodiscard]] SkyLight make(const Scene& scene) const override;
+};
+extern const SkyKind kHosekWilkie;
 
 /// Below the horizon is ground of the sky's albedo, uniformly lit by sky and Sun. Importance-sampled by a table of
 /// its radiance over 64 x 128 cells of equal solid angle.
 class AnalyticSkyBackground final : public Background {
 public:
-    /// `scene` has a sky and a Sun.
-    explicit AnalyticSkyBackground(const Scene& scene);
+    AnalyticSkyBackground(const AnalyticSky& sky, const Sun& sun);
 
     [[nodiscard]] Rgb radiance(const Vec3& direction) const noexcept override;
     [[nodiscard]] bool is_sampled() const noexcept override { return true; }
@@ -42,7 +52,7 @@ private:
 /// Attenuates direct sunlight by air of the sky's turbidity; nothing else is attenuated.
 class SunThroughAir final : public Medium {
 public:
-    explicit SunThroughAir(const Scene& scene);
+    SunThroughAir(const AnalyticSky& sky, const Sun& sun);
     [[nodiscard]] MediumSegment along(const BodyPoses&, const Ray& ray, double range_m,
                                       double) const noexcept override {
         return {transmittance_of_ray(ray, range_m), {}};

@@ -3,6 +3,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "renderer/geometry/shape_kind.h"
 #include "renderer/light/air_for_lidar.h"
 
 namespace narpa {
@@ -31,10 +32,9 @@ std::optional<Vec3> to_sun(const std::optional<Sun>& sun, const Planet::Frame& f
 
 Planet::Planet(const Scene& scene) : body(static_cast<std::size_t>(scene.atmosphere->body)) {
     assert(body < scene.bodies.size());
-    if (const auto* const e = std::get_if<Ellipsoid>(&scene.bodies[body].shape)) {
-        const double radius = scene.atmosphere->air.ground_radius_m;
-        scale = {radius / e->semi_axes_m.x, radius / e->semi_axes_m.y, radius / e->semi_axes_m.z};
-    }
+    const double radius = scene.atmosphere->air.ground_radius_m;
+    const auto axes = semi_axes_m(scene.bodies[body]);
+    if (axes && !(axes->x == axes->y && axes->y == axes->z)) scale = Vec3{radius, radius, radius} / *axes;
 }
 
 AtmosphereMedium::AtmosphereMedium(const Scene& scene, int threads)

@@ -1,7 +1,7 @@
 /// renderer/light/background.h - radiance of escaped rays, from beyond all bodies.
 ///
-/// A new kind (a sky) is a class in its own files, passed to RenderScene::create. The Sun's disc is separate
-/// (sun_disc.h). Units: W m^-2 sr^-1; directions are unit, in world axes, away from the viewer.
+/// A new kind is a class in its own files; of a Sky (sky_kind.h), or passed to RenderScene::create. The Sun's disc
+/// is separate (sun_disc.h). Units: W m^-2 sr^-1; directions are unit, in world axes, away from the viewer.
 #pragma once
 
 #include <optional>

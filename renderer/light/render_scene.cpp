@@ -1,7 +1,7 @@
 #include "renderer/light/render_scene.h"
 
-#include "renderer/light/analytic_sky.h"
 #include "renderer/light/atmosphere.h"
+#include "renderer/light/sky_kind.h"
 
 namespace narpa {
 namespace {
@@ -19,16 +19,15 @@ Status check_light(const Scene& s, const Light& l) {
 }  // namespace
 
 Result<RenderScene> RenderScene::create(const Scene& scene, int threads,
-                                        const std::vector<std::shared_ptr<const Shape>>& shapes,
                                         std::unique_ptr<const Background> background,
                                         std::unique_ptr<const Medium> medium) {
-    auto tracer = Tracer::create(scene, threads, shapes);
+    auto tracer = Tracer::create(scene, threads);
     if (!tracer) return tracer.error();
     for (const Light& l : scene.lights)
         if (const Status good = check_light(scene, l); !good) return good.error();
-    if (scene.sky && scene.sun && background == nullptr && medium == nullptr) {
-        background = std::make_unique<AnalyticSkyBackground>(scene);
-        medium = std::make_unique<SunThroughAir>(scene);
+    if (scene.sky && background == nullptr && medium == nullptr) {
+        SkyLight sky = scene.sky->make(scene);
+        background = std::move(sky.background), medium = std::move(sky.medium);
     }
     if (scene.atmosphere && medium == nullptr) medium = std::make_unique<AtmosphereMedium>(scene, threads);
     if (background == nullptr) background = std::make_unique<UniformBackground>(scene.ambient);

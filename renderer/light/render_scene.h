@@ -4,7 +4,6 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "base/result.h"
 #include "renderer/geometry/tracer.h"
@@ -16,11 +15,10 @@ namespace narpa {
 
 class RenderScene {
 public:
-    /// `scene` must outlive it. `threads` limits the threads that build; 0 is all. `shapes` as in Tracer::create.
+    /// `scene` must outlive it. `threads` limits the threads that build; 0 is all.
     /// `background` null: the scene's sky, or its ambient radiance; `medium` null: its atmosphere, or a vacuum.
     /// Errors: those of Tracer::create; a light whose mount is not a body of the scene, or that has no size.
     static Result<RenderScene> create(const Scene& scene, int threads = 0,
-                                      const std::vector<std::shared_ptr<const Shape>>& shapes = {},
                                       std::unique_ptr<const Background> background = nullptr,
                                       std::unique_ptr<const Medium> medium = nullptr);
     template <class... Rest>

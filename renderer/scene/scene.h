@@ -23,6 +23,8 @@
 namespace narpa {
 
 class LidarModel;
+class Sky;
+struct ShapeKind;
 
 /// Triangles in the body's own frame, metres. Degenerate and non-finite ones were dropped when it was read.
 struct Mesh {
@@ -36,23 +38,19 @@ struct Mesh {
     bool height_field = false;                        ///< a terrain: counts as open, whatever its edges
 };
 
-struct Sphere {
-    double radius_m = 1;
-    int material = 0;  ///< index into Scene::materials
-};
-
-/// (x/a)^2 + (y/b)^2 + (z/c)^2 = 1 in the body's frame.
-struct Ellipsoid {
-    Vec3 semi_axes_m{1, 1, 1};
-    int material = 0;  ///< index into Scene::materials
+/// A shape in the body's own frame that is not made of triangles. Kinds: renderer/geometry/shape_kind.h.
+struct ExactShape {
+    const ShapeKind* kind = nullptr;  ///< never null
+    std::vector<double> values{};     ///< the kind's parameters, in the order of its keys
+    int material = 0;                 ///< index into Scene::materials
 };
 
 struct Body {
     std::string name;
-    std::variant<int, Sphere, Ellipsoid> shape;  ///< index into Scene::meshes, or an exact shape
-    Motion initial{};                            ///< at time 0
-    std::shared_ptr<const Course> course{};      ///< null: constant velocity and rate from `initial`
-    std::optional<std::uint32_t> can_id{};       ///< base identifier of its pose commands on CAN
+    std::variant<int, ExactShape> shape;     ///< index into Scene::meshes, or an exact shape
+    Motion initial{};                        ///< at time 0
+    std::shared_ptr<const Course> course{};  ///< null: constant velocity and rate from `initial`
+    std::optional<std::uint32_t> can_id{};   ///< base identifier of its pose commands on CAN
 };
 
 /// Motion of a body without commands.
@@ -165,7 +163,7 @@ struct Scene {
     std::optional<StarField> stars{};
     Rgb ambient{};  ///< radiance arriving from everywhere, W m^-2 sr^-1 a band
     std::optional<Atmosphere> atmosphere{};
-    std::optional<AnalyticSky> sky{};
+    std::shared_ptr<const Sky> sky{};  ///< null: none; kinds: renderer/light/sky_kind.h
     std::vector<Light> lights;
     std::vector<Body> bodies;
     std::vector<Mesh> meshes;

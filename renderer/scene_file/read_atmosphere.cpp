@@ -1,50 +1,36 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "renderer/atmosphere/air.h"
+#include "renderer/atmosphere/air_kind.h"
+#include "renderer/geometry/shape_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
 namespace {
 
-using Planet = AirDescription::Planet;
-constexpr std::array<std::string_view, 2> kPlanetNames{"earth", "mars"};
-constexpr std::array<std::string_view, 1> kSkyNames{"hosek-wilkie"};
 constexpr Range kAirHeight{.low = 100, .high = 1e5};
-constexpr TableKey kTurbidityRow{"turbidity", rows::number({.low = 1, .high = 10})},
-    kGroundAlbedoRow{"ground_albedo", rows::number(kUnit)};
 constexpr TableKey kAtmosphereRows[]{
     {"body", rows::text(), "the name of the [[body]] that the air surrounds"},
-    {"planet", rows::choice<kPlanetNames>()},
-    kTurbidityRow,
-    {"ozone_du", rows::number({.low = 0, .high = 1000})},
-    {"dust_depth", rows::number({.low = 0, .high = 10})},
+    {"planet", rows::kind("earth")},
     {"top_m", rows::number({.low = 1e4, .high = 5e5})},
     {"gas_height_m", rows::number(kAirHeight)},
     {"aerosol_height_m", rows::number(kAirHeight)},
     {"gas_amount", rows::number({.low = 0, .high = 100})},
     {"lidar_ratio_sr", rows::number({.low = 1, .high = 1000})},
-    kGroundAlbedoRow,
+    {"ground_albedo", rows::number(kUnit)},
     {"ground_radius_m", rows::number({.low = 1e5, .high = 1e9})},
     {"samples_per_band", rows::integer(1, Air::kMaxPerBand)},
     {"steps", rows::integer(4, 32)},
 };
-constexpr TableKey kSkyRows[]{
-    {"model", rows::choice<kSkyNames>(), "\"hosek-wilkie\""},
-    kTurbidityRow,
-    kGroundAlbedoRow,
-    {"up", rows::direction()},
-};
 
-/// Radius of the sphere with the body's volume; nullopt for a mesh.
+/// Radius of the sphere with the body's volume; nullopt for other shapes.
 std::optional<double> mean_radius_m(const Body& body) {
-    if (const auto* s = std::get_if<Sphere>(&body.shape)) return s->radius_m;
-    if (const auto* e = std::get_if<Ellipsoid>(&body.shape))
-        return std::cbrt(e->semi_axes_m.x * e->semi_axes_m.y * e->semi_axes_m.z);
-    return std::nullopt;
+    const auto axes = semi_axes_m(body);
+    if (!axes) return std::nullopt;
+    const auto [a, b, c] = *axes;
+    return a == b && b == c ? a : std::cbrt(a * b * c);  // a cubic root rounds
 }
 
 /// Index of the body that is named; -1 and a problem otherwise.
@@ -74,8 +60,7 @@ void read_ground(TableReader& table, const Body& body, const SceneReading& readi
         table.require("ground_radius_m", "the radius of the ground about the body's origin: the body is no sphere");
     air.ground_radius_m = own.value_or(radius.value_or(air.ground_radius_m));
     if (own && !table.has("ground_albedo")) {
-        const int material = std::holds_alternative<Sphere>(body.shape) ? std::get<Sphere>(body.shape).material
-                                                                        : std::get<Ellipsoid>(body.shape).material;
+        const int material = std::get<ExactShape>(body.shape).material;
         const Material& m = reading.scene.materials[static_cast<std::size_t>(material)];
         if (m.kind == &kinds::lambert && !names_texture(reading, material))
             air.ground_albedo = std::min(1.0, static_cast<double>(mean_band(m.diffuse)));
@@ -89,62 +74,26 @@ void read_air(TableReader& table, AirDescription& air) {
     table.read("aerosol_height_m", air.aerosol_height_m);
     table.read("gas_amount", air.gas_amount);
     table.read("lidar_ratio_sr", air.aerosol_lidar_ratio_sr);
-    if (air.planet == Planet::earth) {
-        table.refuse("dust_depth", "belongs to planet = \"mars\"; the Earth's aerosol has a \"turbidity\"");
-    } else {
-        for (const std::string_view key : {"turbidity", "ozone_du"})
-            table.refuse(key, "belongs to planet = \"earth\"; the dust of Mars has a \"dust_depth\"");
-    }
-    table.read("turbidity", air.turbidity);
-    table.read("ozone_du", air.ozone_du);
-    table.read("dust_depth", air.aerosol_depth);
+    air.kind->read(table, air);
 }
 
-void read_planet_air(TableReader& root, SceneReading& reading) {
+}  // namespace
+
+constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows, .kinds = kinds_of<air_kinds>};
+
+void read_atmosphere(TableReader& root, SceneReading& reading) {
     auto table = root.table("atmosphere");
     if (!table) return;
     Atmosphere a;
     Scene& scene = reading.scene;
     a.body = planet_body(*table, scene.bodies);
-    Planet planet = Planet::earth;
-    table->read("planet", planet);
-    a.air = planet == Planet::earth ? earth_air() : mars_air();
+    a.air = air_kinds()[table->kind().value_or(0)]->standard();
     if (a.body >= 0) read_ground(*table, scene.bodies[static_cast<std::size_t>(a.body)], reading, a.air);
     read_air(*table, a.air);
     table->read("samples_per_band", a.samples_per_band);
     table->read("steps", a.steps);
     table->finish();
     if (a.body >= 0) scene.atmosphere = a;
-}
-
-void read_sky(TableReader& root, SceneReading& reading) {
-    auto table = root.table("sky");
-    if (!table) return;
-    (void)table->word("model");
-    AnalyticSky sky;
-    sky.up = table->direction("up").value_or(sky.up);
-    table->read("turbidity", sky.turbidity);
-    table->read("ground_albedo", sky.ground_albedo);
-    table->finish();
-    if (!reading.scene.sun) {
-        root.fail("sky", "a sky is lit by the Sun, expected a [sun]");
-    } else if (dot(sky.up, normalized(reading.scene.sun->direction)) < 0) {
-        root.fail("sky",
-                  "the Sun stands below this sky's horizon, where its model ends; expected a Sun above, or an "
-                  "[atmosphere], which has twilight");
-    }
-    for (const std::string_view other : {"atmosphere", "ambient"})
-        root.refuse(other, "the scene has a [sky] too, expected one of the two");
-    reading.scene.sky = sky;
-}
-
-}  // namespace
-
-constinit const TableKeys kAtmosphereKeys{.rows = kAtmosphereRows}, kSkyKeys{.rows = kSkyRows};
-
-void read_atmosphere(TableReader& root, SceneReading& reading) {
-    read_planet_air(root, reading);
-    read_sky(root, reading);
 }
 
 }  // namespace narpa

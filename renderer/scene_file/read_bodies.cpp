@@ -3,6 +3,7 @@
 
 #include "base/constants.h"
 #include "renderer/ephemeris/iau_rotation.h"
+#include "renderer/geometry/shape_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -12,16 +13,9 @@ namespace {
 /// CAN identifiers: each body has sixteen, from a base that is a multiple of 16.
 constexpr std::int64_t kIdsPerBody = 16, kLastBaseId = 0x5f0;
 
-constexpr Range kBodyLength{.low = 0, .high = 1e15, .low_open = true};
-constexpr TableKey kSphereRows[]{{"radius_m", rows::number(kBodyLength), "a number > 0"}};
-constexpr TableKey kEllipsoidRows[]{
-    {"semi_axes_m", rows::vec3(kBodyLength), "[a, b, c], the half lengths along the body's x, y and z"}};
-constexpr TableKeys kSphereKeys{.rows = kSphereRows}, kEllipsoidKeys{.rows = kEllipsoidRows};
 constexpr TableKey kBodyRows[]{
     kNameRow,
     {"mesh", rows::file()},
-    {"sphere", rows::table(kSphereKeys)},
-    {"ellipsoid", rows::table(kEllipsoidKeys)},
     {"dem", rows::or_file(rows::table(kDemKeys))},
     {"scale", rows::number({.low = 0, .high = 1e12, .low_open = true})},
     {"crease_angle_deg", rows::number({.low = 0, .high = 180})},
@@ -34,20 +28,6 @@ constexpr TableKey kBodyRows[]{
     {"can_id", rows::integer(0, kLastBaseId)},
     {"material", rows::table(kMaterialKeys)},
 };
-
-Sphere read_sphere(TableReader& table, int material) {
-    Sphere sphere{.material = material};
-    table.read("radius_m", sphere.radius_m);
-    table.finish();
-    return sphere;
-}
-
-Ellipsoid read_ellipsoid(TableReader& table, int material) {
-    Ellipsoid ellipsoid{.material = material};
-    table.read("semi_axes_m", ellipsoid.semi_axes_m);
-    table.finish();
-    return ellipsoid;
-}
 
 NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<int> material,
                      const SceneReading& reading) {
@@ -62,23 +42,28 @@ NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<
 
 /// Records a problem unless the body has exactly one shape.
 void check_one_shape(TableReader& table) {
-    const char* first = nullptr;
-    for (const char* key : {"mesh", "sphere", "ellipsoid", "dem"}) {
-        if (!table.has(key)) continue;
-        if (first) table.fail(key, fmt::format("this body has a {} already, expected one of the two", first));
-        if (!first) first = key;
+    std::vector<std::string_view> keys{"mesh"};
+    std::string shapes = "mesh = \"FILE\"";
+    for (const ShapeKind* kind : shape_kinds()) {
+        keys.push_back(kind->name);
+        shapes += fmt::format(" or {} = {}", kind->name, kind->example);
     }
-    if (!first)
-        table.require("mesh",
-                      "mesh = \"FILE\" or sphere = {radius_m = ...} or ellipsoid = {semi_axes_m = [a, b, c]} or "
-                      "dem = \"FILE\"");
+    keys.push_back("dem");
+    std::string_view first;
+    for (const std::string_view key : keys) {
+        if (!table.has(key)) continue;
+        if (!first.empty())
+            table.fail(key, fmt::format("this body has a {} already, expected one of the two", first));
+        if (first.empty()) first = key;
+    }
+    if (first.empty()) table.require("mesh", shapes + " or dem = \"FILE\"");
 }
 
 void read_shape(TableReader& table, Body& body, SceneReading& reading) {
     const std::optional<int> own = read_material(table, body.name, reading);
     const auto material = [&] { return own ? *own : add_grey_material(body.name, reading.scene); };
     const auto mesh = table.text("mesh");
-    auto sphere = table.table("sphere"), ellipsoid = table.table("ellipsoid");
+    auto exact = read_exact_shape(table);
     check_one_shape(table);
     if (!table.has("mesh")) {
         table.refuse("scale", "belongs to a mesh; other shapes have their size in metres");
@@ -86,10 +71,9 @@ void read_shape(TableReader& table, Body& body, SceneReading& reading) {
     }
     if (mesh) {
         reading.meshes.push_back(named_mesh(table, *mesh, own, reading));
-    } else if (sphere) {
-        body.shape = read_sphere(*sphere, material());
-    } else if (ellipsoid) {
-        body.shape = read_ellipsoid(*ellipsoid, material());
+    } else if (exact) {
+        exact->material = material();
+        body.shape = *std::move(exact);
     } else if (table.has("dem")) {
         read_dem(table, material(), reading);
     }
@@ -136,7 +120,7 @@ void read_motion(TableReader& table, Motion& motion) {
 
 }  // namespace
 
-constinit const TableKeys kBodyKeys{.rows = kBodyRows};
+constinit const TableKeys kBodyKeys{.rows = kBodyRows, .parts = {&kShapeKeys}};
 
 void read_bodies(TableReader& root, SceneReading& reading) {
     std::vector<std::string> names;

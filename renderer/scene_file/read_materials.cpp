@@ -106,12 +106,7 @@ void read_parameters(TableReader& table, Material& m, SceneReading& reading) {
 
 }  // namespace
 
-constinit const TableKeys kMaterialKeys{.rows = kMaterialRows, .kinds = [] {
-                                            std::vector<TableKind> kinds;
-                                            for (const BsdfKind* k : bsdf_kinds())
-                                                kinds.push_back({k->name, k->keys});
-                                            return kinds;
-                                        }};
+constinit const TableKeys kMaterialKeys{.rows = kMaterialRows, .kinds = kinds_of<bsdf_kinds>};
 
 std::optional<int> read_material(TableReader& body, const std::string& name, SceneReading& reading) {
     auto table = body.table("material");

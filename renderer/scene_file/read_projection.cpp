@@ -63,12 +63,7 @@ ProjectionParameters read_kind(TableReader& camera, const char* key, const Table
     auto table = camera.table(key);
     if (!table) return p;
     if (const auto kind = table->kind()) p.kind = kind_of(keys.kinds()[*kind].name);
-    for (const TableKey& row : p.kind->keys) {
-        if (row.value.type == KeyValue::Type::numbers)
-            p.values = table->numbers(row.name).value_or(std::vector<double>(4));
-        else
-            p.values.push_back(table->number(row.name).value_or(0));
-    }
+    p.values = table->values(p.kind->keys, 0);
     table->finish();
     return p;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "renderer/keys/toml_file.h"
+#include "renderer/light/sky_kind.h"
 #include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/scene_parts.h"
 
@@ -28,6 +29,7 @@ void read_root(TableReader& root, SceneReading& reading) {
     read_lights(root, reading);
     read_sensors(root, reading);
     read_atmosphere(root, reading);
+    read_sky(root, reading.scene);
     root.finish();
     if (reading.problems.none()) load_named_files(reading);
 }

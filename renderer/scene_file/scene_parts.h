@@ -56,7 +56,7 @@ struct SceneReading {
 };
 
 extern const TableKeys kSceneKeys, kSunKeys, kAmbientKeys, kStarsKeys, kRenderKeys, kBodyKeys, kObserverKeys,
-    kLightKeys, kCameraKeys, kLidarKeys, kAtmosphereKeys, kSkyKeys;
+    kLightKeys, kCameraKeys, kLidarKeys, kAtmosphereKeys;
 extern const TableKeys kMaterialKeys, kDemKeys;  ///< of `material` and `dem` of a body
 extern const TableKeys kOrbitKeys;               ///< of `orbit` of a body
 /// Parts of the keys of cameras: those at the observer, size and projection, optics.
@@ -88,7 +88,7 @@ void read_orbit(TableReader& table, Body& body);
 void read_observer(TableReader& root, SceneReading& reading);
 /// `track` or `azimuth_elevation_deg` of a camera, which put it at the observer.
 void read_tracking(TableReader& table, const SceneReading& reading, Camera& camera);
-/// [atmosphere] and [sky]; bodies and surroundings come first.
+/// [atmosphere]; bodies and surroundings come first.
 void read_atmosphere(TableReader& root, SceneReading& reading);
 /// Opens every mesh and texture that was named.
 void load_named_files(SceneReading& reading);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/constants.h"
+#include "renderer/geometry/ellipsoid.h"
 #include "renderer/geometry/tracer.h"
 #include "renderer/scene/scene.h"
 #include "tests/support/cameras.h"
@@ -119,7 +120,7 @@ inline int add_mesh(Scene& s, Mesh mesh, const Rigid3& T_world_body = {}) {
 inline int add_sphere(Scene& s, double radius_m, const Vec3& centre, int material = 0) {
     Body b;
     b.name = "sphere" + std::to_string(s.bodies.size());
-    b.shape = Sphere{radius_m, material};
+    b.shape = exact_sphere(radius_m, material);
     b.initial.T_world_body.t = centre;
     s.bodies.push_back(std::move(b));
     return static_cast<int>(s.bodies.size()) - 1;

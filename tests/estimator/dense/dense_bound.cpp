@@ -10,6 +10,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
 #include "renderer/camera/detector.h"
+#include "renderer/geometry/ellipsoid.h"
 #include "tests/support/cameras.h"
 
 namespace narpa {
@@ -128,7 +129,7 @@ TEST(DenseBound, ErrorsOfNoiseReachTheBound) {
     m.specular = {0.6f, 0.6f, 0.6f};
     m.exponent = 12;
     scene.materials.push_back(m);
-    scene.bodies.push_back({"ball", Ellipsoid{{1, 1.4, 0.8}, 0}, {}, {}});
+    scene.bodies.push_back({"ball", exact_ellipsoid({1, 1.4, 0.8}), {}, {}});
     const auto render_scene = RenderScene::create(scene);
     ASSERT_TRUE(render_scene);
     Camera camera;

@@ -103,7 +103,7 @@ Scene ellipsoid_of(const Material& material) {
     s.sun = Sun{normalized(Vec3{0.6, -0.3, -0.7}), 1361, 0.0093};
     s.ambient = {20, 20, 20};
     s.materials.push_back(material);
-    s.bodies.push_back({"ball", Ellipsoid{{1, 1.4, 0.8}, 0}, {}, {}});
+    s.bodies.push_back({"ball", exact_ellipsoid({1, 1.4, 0.8}), {}, {}});
     return s;
 }
 

@@ -42,13 +42,13 @@ Scene sky_scene(double elevation_deg) {
     s.materials.push_back(lambert(0.5f));
     add_mesh(s, plate(4, 4));  // faces +z
     s.sun = Sun{.direction = {std::cos(elevation_deg * kRadPerDeg), 0, std::sin(elevation_deg * kRadPerDeg)}};
-    s.sky = AnalyticSky{};
+    s.sky = std::make_shared<AnalyticSky>();
     return s;
 }
 
 TEST(AnalyticSky, HasADensityOfOneAndSamplesByIt) {
     const Scene s = sky_scene(30);
-    const AnalyticSkyBackground sky(s);
+    const AnalyticSkyBackground sky(AnalyticSky{}, *s.sun);
     double sum = 0, mean = 0;
     constexpr int kRows = 128, kColumns = 256;
     for (int i = 0; i < kRows; ++i)
@@ -73,7 +73,7 @@ TEST(AnalyticSky, LightsAPlaneByItsIrradianceAndTheSunThroughTheAir) {
     const Scene s = sky_scene(30);
     const auto render_scene = RenderScene::create(s, 1);
     ASSERT_TRUE(render_scene);
-    const AnalyticSkyBackground sky(s);
+    const AnalyticSkyBackground sky(AnalyticSky{}, *s.sun);
     const Rgb sunlight = sunlight_transmittance(3, 30 * kRadPerDeg);
     const double direct = 0.5 / kPi * 1361 * 0.5 * static_cast<double>(sunlight.y);
     const double expected = 0.5 * static_cast<double>(sky.ambient().y) + direct;

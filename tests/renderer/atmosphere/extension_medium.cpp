@@ -37,7 +37,7 @@ private:
 
 Estimate estimate(const Scene& s, double emission, const Ray& ray, const PathSettings& settings,
                   std::uint32_t samples = 1) {
-    const auto render_scene = RenderScene::create(s, 1, {}, nullptr, std::make_unique<Homogeneous>(emission));
+    const auto render_scene = RenderScene::create(s, 1, nullptr, std::make_unique<Homogeneous>(emission));
     EXPECT_TRUE(render_scene);
     return light_along(*render_scene, placed(s), ray, settings, samples);
 }

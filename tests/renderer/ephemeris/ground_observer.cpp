@@ -289,7 +289,7 @@ TEST(GroundScene, AStationDimsByTheRangeLawThroughTheAir) {
     s.sun = Sun{};
     s.atmosphere.emplace();
     add_sphere(s, 50, {0, 0, 6'771'000});
-    std::get<Sphere>(s.bodies.back().shape).material = 1;
+    std::get<ExactShape>(s.bodies.back().shape).material = 1;
     s.sun->direction = normalized(Vec3{1, 0, 0.3});
     const Vec3 eye{0, 0, 6'371'002};
     const auto through_air = RenderScene::create(s, 2);

@@ -206,7 +206,7 @@ TEST(TinyBody, EllipsoidIsSampledOverItsOwnOutline) {
     far.scene.materials[0].emission = {1, 1, 1};
     const Vec3 a{5, 0.5, 2};
     Body body;
-    body.shape = Ellipsoid{a, 0};
+    body.shape = exact_ellipsoid(a);
     far.scene.bodies.push_back(body);
     std::mt19937_64 random(10);
     for (int k = 0; k < 20; ++k) {

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "renderer/camera/scene_camera.h"
+#include "renderer/geometry/ellipsoid.h"
 #include "renderer/geometry/mesh_shape.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/cameras.h"
@@ -89,12 +90,12 @@ Scene mixed_scene(Random& random) {
     s.meshes = {wandering_strip(random, 400, 1), wandering_strip(random, 12, 3), tube(10, 0.2, 24), tube(1, 1, 6)};
     for (int i = 0; i < 8; ++i) s.bodies.push_back(mesh_body(i % 4));
     for (int i = 0; i < 5; ++i)
-        s.bodies.push_back({.name = "sphere", .shape = Sphere{.radius_m = std::pow(10.0, i - 2)}});
+        s.bodies.push_back({.name = "sphere", .shape = exact_sphere(std::pow(10.0, i - 2))});
     for (int i = 0; i < 7; ++i)
         s.bodies.push_back(
             {.name = "ellipsoid",
-             .shape = Ellipsoid{.semi_axes_m = {std::exp(uniform(random, -3, 3)), std::exp(uniform(random, -3, 3)),
-                                                std::exp(uniform(random, -3, 3))}}});
+             .shape = exact_ellipsoid({std::exp(uniform(random, -3, 3)), std::exp(uniform(random, -3, 3)),
+                                       std::exp(uniform(random, -3, 3))})});
     return s;
 }
 
@@ -236,8 +237,8 @@ TEST(TileCulling, MarksLittleMoreThanBodiesCover) {
     scene.materials.emplace_back();
     scene.meshes = {tube(40, 1.5, 48), station()};
     scene.bodies = {{.name = "long thin craft", .shape = 0}, {.name = "station", .shape = 1}};
-    scene.bodies.push_back({.name = "sphere", .shape = Sphere{.radius_m = 7}});
-    scene.bodies.push_back({.name = "ellipsoid", .shape = Ellipsoid{.semi_axes_m = {12, 3, 5}}});
+    scene.bodies.push_back({.name = "sphere", .shape = exact_sphere(7)});
+    scene.bodies.push_back({.name = "ellipsoid", .shape = exact_ellipsoid({12, 3, 5})});
     const Tracer tracer = tracer_of(scene);
     for (std::size_t body = 0; body < scene.bodies.size(); ++body) {
         Areas sum;
@@ -261,7 +262,7 @@ TEST(TileCulling, FollowsTheHorizon) {
     const Camera camera = camera_of(512, 512, 400);
     Scene scene;
     scene.materials.emplace_back();
-    scene.bodies = {{.name = "Earth", .shape = Ellipsoid{.semi_axes_m = {6378137, 6378137, 6356752}}}};
+    scene.bodies = {{.name = "Earth", .shape = exact_ellipsoid({6378137, 6378137, 6356752})}};
     const Tracer tracer = tracer_of(scene);
     for (const double height_m : {2.0, 400e3}) {
         BodyPoses at(1);
@@ -292,7 +293,7 @@ TEST(TileCulling, ListsNothingWhereNothingIs) {
 TEST(TileCulling, ListsAllWhereMoreCrowdThanItCounts) {
     Scene scene;
     scene.materials.emplace_back();
-    for (int i = 0; i < 40; ++i) scene.bodies.push_back({.name = "sphere", .shape = Sphere{.radius_m = 0.5}});
+    for (int i = 0; i < 40; ++i) scene.bodies.push_back({.name = "sphere", .shape = exact_sphere(0.5)});
     const Tracer tracer = tracer_of(scene);
     Camera camera = camera_of(64, 64, 64);
     test::set_principal_point(camera, 27.5, 27.5);  // the middle of a tile

@@ -73,6 +73,17 @@ private:
     BoxNode box_;
 };
 
+const ShapeKind kTiltedSquare{
+    .name = "tilted_square",
+    .example = "{tilt_rad = ..., half_m = ...}",
+    .expected = "a tilted square has a positive length",
+    .make = [](std::span<const double> values, int, bool) -> std::shared_ptr<const Shape> {
+        const double tilt_rad = values[0], half_m = values[1];
+        if (!(half_m > 0)) return nullptr;
+        return std::make_shared<TiltedSquare>(Vec3{1, 0, 0}, Vec3{0, std::cos(tilt_rad), std::sin(tilt_rad)},
+                                              half_m);
+    }};
+
 /// A ball over the tilted square, under the Sun; far from the world's origin.
 struct Stage {
     static constexpr double kTilt = 0.4, kHalf = 3;
@@ -83,10 +94,11 @@ struct Stage {
 
     Stage() {
         scene.materials.push_back(lambert(0.6f));
-        add_sphere(scene, 1, centre);  // its Body::shape is not used
+        add_sphere(scene, 1, centre);
+        scene.bodies.back().shape = ExactShape{&kTiltedSquare, {kTilt, kHalf}};
         add_sphere(scene, 0.5, centre + Vec3{0, 0, 2});
         add_sun(scene, {0, 0, 1});
-        tracer.emplace(*Tracer::create(scene, 1, {std::make_shared<TiltedSquare>(x, y, kHalf)}));
+        tracer.emplace(*Tracer::create(scene, 1));
         at = placed(scene);
     }
     /// Where a ray hits the plane of the square.
@@ -133,9 +145,17 @@ TEST(ShapeJoint, RangesOfAnAddedShapeAreExact) {
     EXPECT_GT(off, 100);
 }
 
+TEST(ShapeJoint, BadValuesOfAnAddedShapeAreNamed) {
+    Stage s;
+    s.scene.bodies[0].shape = ExactShape{&kTiltedSquare, {0, -1}};
+    const auto tracer = Tracer::create(s.scene, 1);
+    ASSERT_FALSE(tracer);
+    EXPECT_NE(tracer.error().what.find(kTiltedSquare.expected), std::string::npos);
+}
+
 TEST(ShapeJoint, AnAddedShapeIsRenderedLitAndShadowed) {
     const Stage s;
-    const auto frames = RenderScene::create(s.scene, 1, {std::make_shared<TiltedSquare>(s.x, s.y, Stage::kHalf)});
+    const auto frames = RenderScene::create(s.scene, 1);
     ASSERT_TRUE(frames) << frames.error().text();
     const Camera c = camera(120, 90, 90);
     const Rigid3 T = looking(s.centre + Vec3{2, -7, 5}, s.centre);

@@ -26,10 +26,10 @@ Scene crowd(std::mt19937_64& rng) {
         scene.bodies.push_back(b);
     };
     for (int i = 0; i < 40; ++i) add(i % 2, 6.0 * Vec3{n(rng), n(rng), n(rng)});  // more than one batch of bodies
-    add(Sphere{2, 0}, {0, 1, 0});
-    add(Sphere{6.4e6, 0}, {0, 0, -6.8e6});
-    add(Ellipsoid{{1, 2, 3}, 0}, {4, 0, 1});
-    add(Ellipsoid{{3.0e6, 3.1e6, 2.9e6}, 0}, {0, 9e6, 0});
+    add(exact_sphere(2), {0, 1, 0});
+    add(exact_sphere(6.4e6), {0, 0, -6.8e6});
+    add(exact_ellipsoid({1, 2, 3}), {4, 0, 1});
+    add(exact_ellipsoid({3.0e6, 3.1e6, 2.9e6}), {0, 9e6, 0});
     return scene;
 }
 

@@ -35,7 +35,7 @@ constexpr std::uint32_t kAll = (1u << kLanes) - 1;
 void add_ellipsoid(Scene& s, const Vec3& semi_axes_m, const Rigid3& T_world_body) {
     Body b;
     b.name = "ellipsoid";
-    b.shape = Ellipsoid{semi_axes_m, 0};
+    b.shape = exact_ellipsoid(semi_axes_m);
     b.initial.T_world_body = T_world_body;
     s.bodies.push_back(b);
 }

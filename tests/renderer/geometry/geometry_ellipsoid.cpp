@@ -22,7 +22,7 @@ Scene ellipsoid(const Vec3& semi_axes_m, const Rigid3& T_world_body = {}) {
     s.materials.push_back(lambert(0.4f));
     Body b;
     b.name = "planet";
-    b.shape = Ellipsoid{semi_axes_m, 0};
+    b.shape = exact_ellipsoid(semi_axes_m);
     b.initial.T_world_body = T_world_body;
     s.bodies.push_back(b);
     return s;

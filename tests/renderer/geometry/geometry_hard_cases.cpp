@@ -461,7 +461,7 @@ TEST(ManyBodies, NearestOfManyWins) {
             Scene one;
             const Rigid3 inverse_T = inverse(at.T_world_body[b]);
             double t = kInfinity;
-            if (std::holds_alternative<Sphere>(s.bodies[b].shape)) {
+            if (std::holds_alternative<ExactShape>(s.bodies[b].shape)) {
                 const Vec3 o = inverse_T * aimed.origin, d = inverse_T.q * aimed.direction;
                 const double k = -dot(o, d), disc = 1.5 * 1.5 - (dot(o, o) - k * k);
                 if (disc > 0 && k > 0) t = k - std::sqrt(disc);
@@ -515,13 +515,13 @@ TEST(TracerErrors, BadMeshesAreNamed) {
     EXPECT_TRUE(tracer_of(s));
     add_sphere(s, -1, {});
     EXPECT_FALSE(tracer_of(s));
-    s.bodies.back().shape = Ellipsoid{{1, 0, 1}, 0};
+    s.bodies.back().shape = exact_ellipsoid({1, 0, 1});
     tracer = tracer_of(s);
     ASSERT_FALSE(tracer);
     EXPECT_NE(tracer.error().what.find("semi-axes"), std::string::npos);
-    s.bodies.back().shape = Ellipsoid{{1, 2, 1}, 3};
+    s.bodies.back().shape = exact_ellipsoid({1, 2, 1}, 3);
     EXPECT_FALSE(tracer_of(s));
-    s.bodies.back().shape = Ellipsoid{{1, 2, 1}, 0};
+    s.bodies.back().shape = exact_ellipsoid({1, 2, 1});
     EXPECT_TRUE(tracer_of(s));
     s.materials[0].normal_texture = 4;
     tracer = tracer_of(s);

@@ -19,7 +19,7 @@ Scene four_bodies() {
     add_mesh(s, box(1, 2, 3), {{}, {3, 0, 0}});
     add_sphere(s, 1, {0, 3, 0});
     add_sphere(s, 1.5, {0, -3, 0});
-    s.bodies.back().shape = Ellipsoid{{1, 2, 1}, 0};
+    s.bodies.back().shape = exact_ellipsoid({1, 2, 1});
     return s;
 }
 

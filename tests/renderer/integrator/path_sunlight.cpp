@@ -299,7 +299,7 @@ TEST(PathRadiance, EqualsThatOfBsdfSamplingAlone) {
     s.sun->irradiance_w_m2 = 10;
     add_sphere(s, 0.25, {-1.5, -1, 0.75});
     Body egg;
-    egg.shape = Ellipsoid{{0.25, 0.5, 0.375}, 4};
+    egg.shape = exact_ellipsoid({0.25, 0.5, 0.375}, 4);
     egg.initial.T_world_body = {normalized(Quat{0.9, 0.1, 0.3, 0.2}), {1, 1.5, 1}};
     s.bodies.push_back(egg);
     const auto render_scene = RenderScene::create(s, 1);

@@ -36,7 +36,7 @@ Scene bodies_about_a_lidar() {
     for (Vec3f& p : far.positions) p += Vec3f{300, 0, 0};
     add_mesh(s, far, {{}, {-294, 0, 0}});
     add_sphere(s, 1.5, {0, 6, 0});
-    s.bodies.back().shape = Ellipsoid{{1, 2, 1}, 0};
+    s.bodies.back().shape = exact_ellipsoid({1, 2, 1});
     return s;
 }
 

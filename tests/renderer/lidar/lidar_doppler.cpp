@@ -25,7 +25,7 @@ TEST(LidarDoppler, IsTheLineOfSightVelocityOfTheMaterialPoint) {
         Scene scene;
         scene.materials.push_back(lambert(0.5f));
         add_sphere(scene, in["radius"], doppler_vec(in["body_center"]));
-        scene.bodies.push_back({.name = "sensor", .shape = Sphere{.radius_m = 1e-9}});
+        scene.bodies.push_back({.name = "sensor", .shape = exact_sphere(1e-9)});
         const auto render_scene = RenderScene::create(scene, 1);
         ASSERT_TRUE(render_scene);
         BodyPoses at(2);
@@ -54,7 +54,7 @@ TEST(LidarDoppler, HasTheLeverOfTheMount) {
     Scene scene;
     scene.materials.push_back(lambert(0.5f));
     add_mesh(scene, plate(50, 50), {exp_rotation({0, kPi, 0}), {0, 0, 30}});
-    scene.bodies.push_back({.name = "chaser", .shape = Sphere{.radius_m = 1e-9}});
+    scene.bodies.push_back({.name = "chaser", .shape = exact_sphere(1e-9)});
     const auto render_scene = RenderScene::create(scene, 1);
     ASSERT_TRUE(render_scene);
     BodyPoses at = placed(scene);

@@ -60,7 +60,7 @@ Scene plates() {
 
 TEST(LidarSunlitAir, IsAsBrightAsACamerasPixel) {
     const Scene scene = plates();
-    const auto hazy = RenderScene::create(scene, 1, {}, nullptr, std::make_unique<Haze>());
+    const auto hazy = RenderScene::create(scene, 1, nullptr, std::make_unique<Haze>());
     ASSERT_TRUE(hazy);
     for (const Vec3& direction : {Vec3{0, 0, 1}, Vec3{0, -1, 0}}) {
         const LidarReceiverModel model{.range_at_10_percent_m = 1000, .sunlight_noise = 2};
@@ -73,7 +73,7 @@ TEST(LidarSunlitAir, IsAsBrightAsACamerasPixel) {
 /// Phi(snr (x / s - 1)) of the echoes are detected, s = sqrt(1 + noise * radiance).
 TEST(LidarSunlitAir, RaisesTheThreshold) {
     Scene scene = plates();
-    const auto hazy = RenderScene::create(scene, 1, {}, nullptr, std::make_unique<Haze>());
+    const auto hazy = RenderScene::create(scene, 1, nullptr, std::make_unique<Haze>());
     ASSERT_TRUE(hazy);
     constexpr double kSnr = 5, kNoise = 8;
     constexpr std::size_t kShots = 20'000;
@@ -129,7 +129,7 @@ TEST(LidarSunlitAir, OfAPlanetIsThatAtItsWavelength) {
     scene.lidars.emplace_back().receiver = {.range_at_10_percent_m = 1e5, .sunlight_noise = 1};
     const auto with_air = RenderScene::create(scene, 1);
     ASSERT_TRUE(with_air);
-    const auto as_a_camera = RenderScene::create(scene, 1, {}, nullptr, std::make_unique<AirAt905>(scene));
+    const auto as_a_camera = RenderScene::create(scene, 1, nullptr, std::make_unique<AirAt905>(scene));
     ASSERT_TRUE(as_a_camera);
     for (const Vec3& direction : {Vec3{1, 0, 0.05}, Vec3{0.3, 0, -1}}) {
         const double seen = pixel(*as_a_camera, normalized(direction));

@@ -35,7 +35,7 @@ public:
 };
 
 RadianceImage render(const Scene& s, const Camera& c, const Rigid3& T, RenderSettings::Method method) {
-    const auto render_scene = RenderScene::create(s, 1, {}, std::make_unique<Gradient>());
+    const auto render_scene = RenderScene::create(s, 1, std::make_unique<Gradient>());
     EXPECT_TRUE(render_scene);
     RadianceImage image(c.width, c.height);
     FrameSettings settings;
@@ -71,7 +71,7 @@ TEST(JointBackground, LightsALambertPlaneByItsIrradiance) {
     for (const bool sampled : {false, true}) {
         std::unique_ptr<const Background> background = std::make_unique<Gradient>();
         if (sampled) background = std::make_unique<SampledGradient>();
-        const auto render_scene = RenderScene::create(s, 1, {}, std::move(background));
+        const auto render_scene = RenderScene::create(s, 1, std::move(background));
         ASSERT_TRUE(render_scene);
         const Estimate e = light_along(*render_scene, placed(s), ray, PathSettings{.max_depth = 2}, 4096);
         // Irradiance: the integral of (a + b cos) cos over the hemisphere, pi a + 2/3 pi b. Radiance: albedo / pi

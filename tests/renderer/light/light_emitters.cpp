@@ -189,7 +189,7 @@ TEST(EllipsoidLamp, IsTheProjectedSolidAngleOfItsOutline) {
     s.materials.push_back(shining(0, {7, 7, 7}));
     Body b;
     b.name = "lamp";
-    b.shape = Ellipsoid{axes, 1};
+    b.shape = exact_ellipsoid(axes, 1);
     b.initial.T_world_body = {q, centre};
     s.bodies.push_back(b);
     // Cosine-weighted directions on a fine grid: those that meet it, over all of them, times pi.

@@ -162,7 +162,7 @@ TEST_P(SmoothGlobe, HasNeitherASeamNorPoles) {
     for (const bool ellipsoid : {false, true}) {
         Scene s = with_texture(globe_map(512, 256, smooth_globe));
         add_sphere(s, 1, {0, 0, 0});
-        if (ellipsoid) s.bodies[0].shape = Ellipsoid{{1, 1, 0.9}, 0};
+        if (ellipsoid) s.bodies[0].shape = exact_ellipsoid({1, 1, 0.9});
         const Look look(s);
         const Camera c = camera(41, 41, 49 / pixel_rad);
         for (const Vec3& from :

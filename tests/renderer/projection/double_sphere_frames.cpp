@@ -60,7 +60,7 @@ TEST(DoubleSphere, TileCullingMissesNoBody) {
     scene.materials.push_back(lambert(1));
     for (int i = 0; i < 4; ++i) add_mesh(scene, bumpy(2, 1 + i, 0.4));
     for (int i = 0; i < 4; ++i) add_sphere(scene, std::pow(10.0, i - 2), {});
-    scene.bodies.back().shape = Ellipsoid{{0.1, 3, 20}, 0};
+    scene.bodies.back().shape = exact_ellipsoid({0.1, 3, 20});
     auto tracer = Tracer::create(scene, 1);
     ASSERT_TRUE(tracer);
     const Camera c = fisheye(150, 150, 45);

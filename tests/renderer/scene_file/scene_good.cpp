@@ -4,6 +4,7 @@
 
 #include "base/constants.h"
 #include "protocols/lidar/lidar_model.h"
+#include "renderer/geometry/shape_kind.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/cameras.h"
@@ -76,10 +77,11 @@ TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
     EXPECT_EQ(target.can_id, 0x100u);
     EXPECT_EQ(s.bodies[1].can_id, 0x110u);
     EXPECT_FALSE(s.bodies[2].can_id);
-    const Sphere& moon = std::get<Sphere>(s.bodies[2].shape);
-    EXPECT_EQ(moon.radius_m, 1737400.0);
+    const auto& moon = std::get<ExactShape>(s.bodies[2].shape);
+    EXPECT_EQ(moon.kind->name, "sphere");
+    EXPECT_EQ(moon.values, std::vector{1737400.0});
     EXPECT_FLOAT_EQ(s.materials[static_cast<std::size_t>(moon.material)].diffuse.x, 0.12f);
-    EXPECT_EQ(std::get<Ellipsoid>(s.bodies[3].shape).semi_axes_m, (Vec3{13000, 11400, 9100}));
+    EXPECT_EQ(semi_axes_m(s.bodies[3]), (Vec3{13000, 11400, 9100}));
 
     const Mesh& overridden = s.meshes[static_cast<std::size_t>(std::get<int>(s.bodies[1].shape))];
     const Material& phong = s.materials[overridden.face_material.front()];

@@ -13,6 +13,7 @@
 #include "base/each_isa.h"
 #include "base/lanes.h"
 #include "generated/commit.h"
+#include "renderer/image/image_file.h"
 #include "renderer/scene_file/scene_file.h"
 
 namespace narpa::cli {
@@ -29,6 +30,13 @@ Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::
         if (const Status good = use_method(*scene, *method); !good) return good.error();
     for (const std::string& w : scene->warnings) say("warning: " + w);
     return scene;
+}
+
+Result<std::vector<std::uint8_t>> load_frame(const std::string& path, const Camera& camera) {
+    std::vector<std::string> warnings;
+    auto frame = read_frame(path, camera, &warnings);
+    for (const std::string& w : warnings) say("warning: " + w);
+    return frame;
 }
 
 Status make_folder_of(const std::string& file) {

@@ -2,6 +2,7 @@
 /// goes to standard error, the JSON document of --json to standard output; exit status: base/result.h.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -51,6 +52,8 @@ nlohmann::json to_json(const Error& e);
 /// Reads a scene from a file, or the shipped one of this name, with another method than its own if one is given,
 /// and prints its warnings.
 Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
+/// Reads a frame as read_frame does, and prints its warnings.
+Result<std::vector<std::uint8_t>> load_frame(const std::string& path, const Camera& camera);
 /// Makes the folder of a file that is to be written; nothing where `file` is empty.
 Status make_folder_of(const std::string& file);
 /// The same for a picture of narpa-plot; an Error where its file extension is not supported.

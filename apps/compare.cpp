@@ -15,7 +15,6 @@
 #include "emulator/world.h"
 #include "estimator/view/frame_comparison.h"
 #include "plot/plot.h"
-#include "renderer/image/image_file.h"
 #include "tracking/frame_tracker.h"
 
 namespace narpa::cli {
@@ -161,7 +160,7 @@ Outcome compare(const CompareOptions& o) {
     const Camera& camera = (*world)->scene().cameras[*index];
     const auto target = target_of(**world, camera.mount, camera.name, o.target);
     if (!target) return target.error();
-    const auto bytes = read_frame(o.frame, camera);
+    const auto bytes = load_frame(o.frame, camera);
     if (!bytes) return bytes.error();
     const auto frame = measured_image(camera, *bytes);
     if (!frame) return Error{frame.error().what, o.frame};

@@ -19,7 +19,6 @@
 #include "estimator/search/cloud_search.h"
 #include "estimator/view/measured_image.h"
 #include "protocols/lidar/lidar_model.h"
-#include "renderer/image/image_file.h"
 #include "tracking/estimate_report.h"
 
 namespace narpa::cli {
@@ -228,7 +227,7 @@ Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
     const auto target =
         target_of(**world, scene.cameras[*camera].mount, scene.cameras[*camera].name, options.target);
     if (!target) return target.error();
-    auto bytes = read_frame(o.frame, scene.cameras[*camera]);
+    auto bytes = load_frame(o.frame, scene.cameras[*camera]);
     if (!bytes) return bytes.error();
     if (auto image = measured_image(scene.cameras[*camera], *bytes); !image)
         return Error{image.error().what, o.frame};

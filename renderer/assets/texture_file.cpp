@@ -2,29 +2,27 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <vector>
 
 #include "base/file_bytes.h"
-#include "renderer/assets/image_codecs.h"
-#include "renderer/assets/image_header.h"
 #include "renderer/material/texture_lookup.h"
 
 namespace narpa {
 namespace {
 
 using Colour = TextureUse::Colour;
+using Kind = TransferCurve::Kind;
 
 /// Lookup table from code to linear light, 65535 = 1.0.
 using Table = std::vector<std::uint16_t>;
 
 template <class Curve>
-Table table_of(int count, Curve linear) {
+Table table_of(std::uint32_t largest, Curve linear) {
     Table table;
-    for (int code = 0; code < count; ++code)
-        table.push_back(static_cast<std::uint16_t>(std::lround(65535.0 * linear(code / (count - 1.0)))));
+    for (std::uint32_t code = 0; code <= largest; ++code)
+        table.push_back(
+            static_cast<std::uint16_t>(std::lround(65535.0 * linear(code / static_cast<double>(largest)))));
     return table;
 }
 
@@ -38,96 +36,94 @@ double from_middle_at_128(double s) {
     return code <= 128 ? code / 256 : 0.5 + (code - 128) / 254;
 }
 
-/// The lookup table for this bit depth, made once.
-const Table& table_for(int bits, Colour colour) {
-    const int count = 1 << bits;
-    if (colour == Colour::srgb || (colour == Colour::by_depth && bits == 8)) {
-        static const Table eight = table_of(1 << 8, linear_from_srgb);
-        if (bits == 8) return eight;
-        static const Table sixteen = table_of(1 << 16, linear_from_srgb);
-        return sixteen;
+TransferCurve curve_for(const DecodedImage& image, Colour colour) {
+    switch (colour) {
+        case Colour::srgb: return {Kind::srgb};
+        case Colour::linear:
+        case Colour::normals: return {Kind::power, 1};
+        case Colour::by_depth: break;
     }
-    if (colour == Colour::normals && bits == 8) {
-        static const Table normals = table_of(count, from_middle_at_128);
-        return normals;
-    }
-    const auto same = [](double s) { return s; };
-    static const Table eight = table_of(1 << 8, same);
-    if (bits == 8) return eight;
-    static const Table sixteen = table_of(1 << 16, same);
-    return sixteen;
+    if (image.transfer.kind != Kind::unspecified) return image.transfer;
+    return image.samples.empty() || image.largest > 255 ? TransferCurve{Kind::power, 1} : TransferCurve{Kind::srgb};
 }
 
-/// OpenCV stores blue first.
-template <class Sample>
-void copy_rgb(const cv::Mat& bgr, const Table& linear, std::uint16_t* out) {
-    for (int y = 0; y < bgr.rows; ++y) {
-        const Sample* in = bgr.ptr<Sample>(y);
-        for (int x = 0; x < bgr.cols; ++x, in += 3, out += 3) {
-            out[0] = linear[in[2]];
-            out[1] = linear[in[1]];
-            out[2] = linear[in[0]];
-        }
-    }
+Table table_for(const DecodedImage& image, Colour colour) {
+    if (colour == Colour::normals && image.largest == 255) return table_of(255, from_middle_at_128);
+    const TransferCurve curve = curve_for(image, colour);
+    if (curve.kind == Kind::srgb) return table_of(image.largest, linear_from_srgb);
+    if (curve.exponent == 1) return table_of(image.largest, [](double s) { return s; });
+    return table_of(image.largest, [&](double s) { return std::pow(s, curve.exponent); });
 }
 
-Result<Texture> from_image(const std::string& name, const cv::Mat& bgr, const TextureUse& use) {
-    Texture texture{.name = name, .width = bgr.cols, .height = bgr.rows, .rgb = {}, .wrap = use.wrap};
-    texture.rgb.resize(3 * bgr.total());
-    if (bgr.type() == CV_8UC3) {
-        copy_rgb<std::uint8_t>(bgr, table_for(8, use.colour), texture.rgb.data());
-    } else if (bgr.type() == CV_16UC3) {
-        copy_rgb<std::uint16_t>(bgr, table_for(16, use.colour), texture.rgb.data());
-    } else {
-        return Error{.what = "image samples of an unknown kind, expected 8 or 16 bits a band", .file = name};
-    }
+std::string words_of(const TransferCurve& curve) {
+    if (curve.kind == Kind::srgb) return "sRGB";
+    return curve.exponent == 1 ? "linear light" : fmt::format("a gamma of {:.5g}", 1 / curve.exponent);
+}
+
+/// Whether two curves differ by no more than sRGB and the gamma of 0.45455 that stands for it.
+bool are_alike(const TransferCurve& a, const TransferCurve& b) {
+    const auto exponent = [](const TransferCurve& c) { return c.kind == Kind::srgb ? 2.2 : c.exponent; };
+    return std::abs(exponent(a) - exponent(b)) < 0.01;
+}
+
+void warn(const std::string& name, const DecodedImage& image, Colour colour, std::vector<std::string>& warnings) {
+    for (const std::string& what : image.unused) warnings.push_back(name + ": " + what);
+    const TransferCurve used = curve_for(image, colour);
+    if (image.transfer.kind != Kind::unspecified && !are_alike(used, image.transfer))
+        warnings.push_back(
+            fmt::format("{}: it declares {}, and is read as {} as the scene or the kind of texture asks", name,
+                        words_of(image.transfer), words_of(used)));
+}
+
+/// Integers of full scale 65535 from floats.
+Status quantize(const std::string& name, DecodedImage& image) {
+    for (const float x : image.floats)
+        if (!(x >= 0 && x <= 1))
+            return Error{
+                .what = fmt::format("has a floating-point sample of {}, expected 0 to 1: gdal_translate -ot "
+                                    "UInt16 -scale converts it",
+                                    x),
+                .file = name};
+    std::ranges::transform(image.floats, std::back_inserter(image.samples), [](float x) {
+        return static_cast<std::uint16_t>(std::lround(65535 * static_cast<double>(x)));
+    });
+    image.largest = 65535;
+    return Ok{};
+}
+
+Result<Texture> from_image(const std::string& name, DecodedImage& image, const TextureUse& use) {
+    const Table linear = table_for(image, use.colour);
+    if (image.samples.empty())
+        if (const Status good = quantize(name, image); !good) return good.error();
+    Texture texture{.name = name, .width = image.width, .height = image.height, .rgb = {}, .wrap = use.wrap};
+    const int copies = image.channels == 1 ? 3 : 1;
+    texture.rgb.resize(static_cast<std::size_t>(copies) * image.samples.size());
+    std::uint16_t* out = texture.rgb.data();
+    for (const std::uint16_t sample : image.samples) out = std::fill_n(out, copies, linear[sample]);
+    image = {};  // the mipmaps take its memory
     build_coarser_levels(texture);
     return texture;
 }
 
-/// Whether a JPEG has no end-of-image marker: the decoder would fill the missing part with grey. Segments (ITU-T
-/// T.81, B.1) before the first scan are skipped by their length, as they may hold a thumbnail; after that the
-/// marker can only be the file's own.
-bool is_jpeg_cut_short(std::span<const std::uint8_t> bytes) {
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (!text.starts_with("\xFF\xD8\xFF")) return false;
-    std::size_t at = 2;
-    while (at + 4 <= text.size() && text[at] == '\xFF' && text[at + 1] != '\xDA')
-        at += 2 + 256U * bytes[at + 2] + bytes[at + 3];
-    return text.find("\xFF\xD9", at) == text.npos;
-}
-
 }  // namespace
 
-Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes,
-                               const TextureUse& use) {
-    const Error no_image{.what = "not an image that can be read, expected PNG, JPEG, TIFF, WebP, BMP or PNM",
-                         .file = name};
+Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes, const TextureUse& use,
+                               std::vector<std::string>* warnings) {
     try {
-        if (bytes.empty()) return Error{.what = "empty file, expected an image", .file = name};
-        const std::optional<ImageSize> size = image_size(bytes);
-        if (!size) return no_image;
-        if (size->width > kMaxPixels || size->height > kMaxPixels / size->width)
-            return Error{.what = fmt::format("an image of {} x {} pixels, expected at most {} of them", size->width,
-                                             size->height, kMaxPixels),
-                         .file = name};
-        if (is_jpeg_cut_short(bytes)) return Error{.what = "a JPEG without an end: it is cut short", .file = name};
-        const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
-        const Result<ImageCodecs> codecs = image_codecs(name);
-        if (!codecs) return codecs.error();
-        const cv::Mat bgr =
-            codecs->imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-        if (bgr.empty()) return no_image;
-        return from_image(name, bgr, use);
-    } catch (const std::exception& e) {
+        Result<DecodedImage> image = decode_image(name, bytes);
+        if (!image) return image.error();
+        if (warnings != nullptr) warn(name, *image, use.colour, *warnings);
+        return from_image(name, *image, use);
+    } catch (const std::exception& e) {  // no memory
         return Error{.what = std::string("image cannot be decoded: ") + e.what(), .file = name};
     }
 }
 
-Result<Texture> read_texture(const std::string& path, const TextureUse& use) {
+Result<Texture> read_texture(const std::string& path, const TextureUse& use, std::vector<std::string>* warnings) {
     Result<std::string> bytes = read_file(path);
     if (!bytes) return bytes.error();
-    return decode_texture(path, {reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()}, use);
+    return decode_texture(path, {reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()}, use,
+                          warnings);
 }
 
 }  // namespace narpa

@@ -1,13 +1,15 @@
 /// renderer/assets/texture_file.h - image files -> linear textures with mipmaps.
 ///
-/// Grey is copied to the three bands; alpha is dropped; an orientation tag is not applied.
+/// Grey is copied to the three bands; alpha is dropped.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
+#include "renderer/assets/image_reader.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -15,8 +17,9 @@ namespace narpa {
 /// How an image is interpreted.
 struct TextureUse {
     enum class Colour : std::uint8_t {
-        by_depth,  ///< colours: 8 bits a band are sRGB (IEC 61966-2-1), 16 bits are linear already
-        srgb,      ///< colours in sRGB, whatever the depth
+        by_depth,  ///< colours: the curve that the file declares, else up to 8 bits a band are sRGB (IEC
+                   ///< 61966-2-1), and more are linear already
+        srgb,      ///< colours in sRGB, whatever the file declares
         linear,    ///< colours in linear light, and data such as heights: full scale = 1, no curve
         normals,   ///< a normal map: linear, with code 128 of 8 bits as 0.5, by convention
     };
@@ -24,13 +27,13 @@ struct TextureUse {
     Texture::Wrap wrap = Texture::Wrap::repeat;
 };
 
-/// Most pixels of an image; with its mipmaps it takes 8 bytes for each, and twice that while it is read.
-inline constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
-
-/// PNG, JPEG, TIFF, WebP, BMP and PNM, whatever the file's name; OpenCV decodes them. Errors name the file.
-Result<Texture> read_texture(const std::string& path, const TextureUse& use = {});
+/// The images of decode_image, of up to kMaxPixels; with its mipmaps a texture takes 8 bytes for each pixel, and
+/// twice that while it is read. Errors name the file. `warnings`: where sentences go about what the file declares
+/// and is not used.
+Result<Texture> read_texture(const std::string& path, const TextureUse& use = {},
+                             std::vector<std::string>* warnings = nullptr);
 /// The same from an image held in memory; `name` is for errors.
 Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes,
-                               const TextureUse& use = {});
+                               const TextureUse& use = {}, std::vector<std::string>* warnings = nullptr);
 
 }  // namespace narpa

@@ -34,6 +34,7 @@ public:
     struct Meaning {
         double scale = 1, offset_m = 0;  ///< height = scale * number + offset
         double no_data = DemRequest::kFromFile;
+        std::vector<double> palette{};  ///< the number that each stored number stands for; empty: itself
     };
 
     GdalSource(GDALDatasetH file, const Meaning& meaning)
@@ -59,7 +60,7 @@ public:
                 return false;
         }
         for (std::size_t i = 0; i < n; ++i) {
-            const double number = heights[i], h = meaning_.scale * number + meaning_.offset_m;
+            const double number = in_palette(heights[i]), h = meaning_.scale * number + meaning_.offset_m;
             const bool known =
                 (!masked_ || mask_[i] != 0) && number != meaning_.no_data && std::abs(h) <= kHighest_m;
             heights[i] = known ? h : kNoHeight;
@@ -68,6 +69,13 @@ public:
     }
 
 private:
+    /// NaN beyond the palette.
+    [[nodiscard]] double in_palette(double number) const {
+        if (meaning_.palette.empty()) return number;
+        const bool is_entry = number >= 0 && number < static_cast<double>(meaning_.palette.size());
+        return is_entry ? meaning_.palette[static_cast<std::size_t>(number)] : kNoHeight;
+    }
+
     GDALDatasetH file_;
     GDALRasterBandH band_;
     int columns_, rows_;
@@ -270,6 +278,23 @@ Status check_band(GDALDatasetH file) {
     return Ok{};
 }
 
+/// The greys of a colour table; empty where the band has none. Numbers that are indices of colours are no heights.
+Result<std::vector<double>> palette_of(GDALRasterBandH band) {
+    std::vector<double> greys;
+    const GDALColorTableH table = GDALGetRasterColorTable(band);
+    for (int i = 0, count = table == nullptr ? 0 : GDALGetColorEntryCount(table); i < count; ++i) {
+        const GDALColorEntry& c = *GDALGetColorEntry(table, i);
+        const bool is_grey = GDALGetPaletteInterpretation(table) == GPI_Gray || (c.c1 == c.c2 && c.c2 == c.c3);
+        if (!is_grey)
+            return Error{
+                fmt::format("its numbers are indices of a palette (colour table) with colours, {} being "
+                            "({}, {}, {}), expected heights, or a palette of greys",
+                            i, c.c1, c.c2, c.c3)};
+        greys.push_back(c.c4 == 0 ? kNoHeight : c.c1);  // the fourth is opacity
+    }
+    return greys;
+}
+
 GdalSource::Meaning meaning_of(GDALRasterBandH band, const DemRequest& r, double radius_m) {
     int known = 0;
     GdalSource::Meaning m;
@@ -305,8 +330,12 @@ Result<OpenDem> open_with_gdal(const DemRequest& request) {
     if (const Status good = geo->read(file, request); !good) return good.error();
     OpenDem dem;
     dem.placement = geo->placement();
-    dem.heights = std::make_unique<GdalSource>(
-        file, meaning_of(GDALGetRasterBand(file, 1), request, dem.placement.equatorial_m));
+    const GDALRasterBandH band = GDALGetRasterBand(file, 1);
+    GdalSource::Meaning meaning = meaning_of(band, request, dem.placement.equatorial_m);
+    auto palette = palette_of(band);
+    if (!palette) return palette.error();
+    meaning.palette = std::move(*palette);
+    dem.heights = std::make_unique<GdalSource>(file, meaning);
     if (geo->around())
         dem.heights = std::make_unique<WholePlanet>(std::move(dem.heights), dem.placement.first_pole != 0,
                                                     dem.placement.last_pole != 0);

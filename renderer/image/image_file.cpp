@@ -16,12 +16,11 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "base/file_bytes.h"
 #include "renderer/assets/image_codecs.h"
-#include "renderer/assets/image_header.h"
+#include "renderer/assets/image_reader.h"
 
 namespace narpa {
 namespace {
@@ -150,54 +149,85 @@ Status write_png(const std::string& path, const RenderedFrame& frame) {
     return narpa::write_png(path, image);
 }
 
-std::string pixels_of(int type) {
-    const std::string kind = CV_MAT_CN(type) == 1 ? "grey" : CV_MAT_CN(type) == 3 ? "colour" : "colour with alpha";
-    return CV_MAT_DEPTH(type) == CV_8U    ? kind + " of 8 bits"
-           : CV_MAT_DEPTH(type) == CV_16U ? kind + " of 16 bits"
-                                          : kind + " of neither 8 nor 16 bits";
+std::string pixels_of(bool is_colour, bool has_alpha, bool has_floats, bool is_16_bit) {
+    return fmt::format("{}{} of {}", is_colour ? "colour" : "grey", has_alpha ? " with alpha" : "",
+                       has_floats  ? "floating-point samples"
+                       : is_16_bit ? "16 bits"
+                                   : "8 bits");
+}
+
+/// Integer samples with full scale at the largest sample of 8 or 16 bits.
+void scale_to(std::uint32_t largest, DecodedImage& image) {
+    if (image.largest == largest) return;
+    for (std::uint16_t& v : image.samples)
+        v = static_cast<std::uint16_t>(std::lround(v * static_cast<double>(largest) / image.largest));
+    image.largest = largest;
+}
+
+/// Samples of 16 bits as a camera of `bits` outputs them, in the upper bits.
+Status take_upper_bits(const std::string& path, const Camera& camera, int bits, DecodedImage& image) {
+    const int unused_bits = 16 - bits, unused = (1 << unused_bits) - 1;
+    const auto code_of_full_scale = static_cast<std::uint32_t>((1 << bits) - 1);
+    const bool is_declared =
+        image.largest < code_of_full_scale + 1 || (image.significant_bits > 0 && image.significant_bits <= bits);
+    if (is_declared) {
+        scale_to(code_of_full_scale, image);
+        for (std::uint16_t& v : image.samples) v = static_cast<std::uint16_t>(v << unused_bits);
+    } else if (std::has_single_bit(image.largest + 1)) {
+        const int shift = 16 - std::bit_width(image.largest);
+        for (std::uint16_t& v : image.samples) v = static_cast<std::uint16_t>(v << shift);
+    } else {
+        return Error{fmt::format("has samples up to {}, expected up to {}, the {} bits of camera \"{}\"",
+                                 image.largest, code_of_full_scale, bits, camera.name),
+                     path};
+    }
+    image.largest = 65535;
+    if (std::ranges::any_of(image.samples, [unused](std::uint16_t v) { return (v & unused) != 0; }))
+        return Error{
+            fmt::format("has numbers of more than the {} bits of camera \"{}\": expected them in the upper "
+                        "bits of 16, that is multiplied by {}",
+                        bits, camera.name, unused + 1),
+            path};
+    return Ok{};
+}
+
+void warn_of_frame(const std::string& path, const DecodedImage& image, std::vector<std::string>& warnings) {
+    for (const std::string& what : image.unused) warnings.push_back(path + ": " + what);
+    const TransferCurve& curve = image.transfer;
+    if (curve.kind == TransferCurve::Kind::srgb || curve.exponent != 1)
+        warnings.push_back(fmt::format("{}: it declares {}, and is read as linear in light", path,
+                                       curve.kind == TransferCurve::Kind::srgb
+                                           ? "sRGB"
+                                           : fmt::format("a gamma of {:.5g}", 1 / curve.exponent)));
 }
 
 /// An image file's pixels in the camera's format.
 Result<std::vector<std::uint8_t>> decode_frame(const std::string& path, const std::string& file,
-                                               const Camera& camera) {
-    const Error no_image{"is no image that can be decoded, expected .raw, .png, .tif or .pgm", path};
-    const auto size = image_size({reinterpret_cast<const std::uint8_t*>(file.data()), file.size()});
-    if (!size) return no_image;
-    if (size->width != static_cast<std::uint64_t>(camera.width) ||
-        size->height != static_cast<std::uint64_t>(camera.height))
-        return Error{fmt::format("is {} x {}, expected {} x {} as camera \"{}\" has", size->width, size->height,
+                                               const Camera& camera, std::vector<std::string>* warnings) {
+    Result<DecodedImage> image =
+        decode_image(path, {reinterpret_cast<const std::uint8_t*>(file.data()), file.size()});
+    if (!image) return image.error();
+    if (image->width != camera.width || image->height != camera.height)
+        return Error{fmt::format("is {} x {}, expected {} x {} as camera \"{}\" has", image->width, image->height,
                                  camera.width, camera.height, camera.name),
                      path};
-    const Result<ImageCodecs> codecs = image_codecs(path);
-    if (!codecs) return codecs.error();
-    const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8U, const_cast<char*>(file.data()));
-    cv::Mat image;
-    try {
-        image = codecs->imdecode(bytes, cv::IMREAD_UNCHANGED);
-    } catch (const std::exception&) {  // of a damaged file too
-    }
-    if (image.cols != camera.width || image.rows != camera.height)
-        return Error{"cannot be decoded: it is damaged, or cut short", path};
-    const int expected = camera.format == PixelFormat::rgb24 ? CV_8UC3
-                         : is_16_bit(camera.format)          ? CV_16UC1
-                                                             : CV_8UC1;
-    if (image.type() != expected)
-        return Error{fmt::format("is {}, expected {}: camera \"{}\" is {}", pixels_of(image.type()),
-                                 pixels_of(expected), camera.name, name(camera.format)),
+    const bool is_colour = camera.format == PixelFormat::rgb24, has_16_bits = is_16_bit(camera.format);
+    if ((image->channels == 3) != is_colour || image->has_alpha || image->samples.empty() ||
+        (image->largest > 255) != has_16_bits)
+        return Error{fmt::format("is {}, expected {}: camera \"{}\" is {}",
+                                 pixels_of(image->channels == 3, image->has_alpha, image->samples.empty(),
+                                           image->largest > 255),
+                                 pixels_of(is_colour, false, false, has_16_bits), camera.name, name(camera.format)),
                      path};
-    if (expected == CV_16UC1 && camera.detector && camera.detector->bits < 16) {
-        const int unused = (1 << (16 - camera.detector->bits)) - 1;
-        if (std::any_of(image.begin<std::uint16_t>(), image.end<std::uint16_t>(),
-                        [unused](std::uint16_t v) { return (v & unused) != 0; }))
-            return Error{
-                fmt::format("has numbers of more than the {} bits of camera \"{}\": expected them in the upper "
-                            "bits of 16, that is multiplied by {}",
-                            camera.detector->bits, camera.name, unused + 1),
-                path};
+    if (warnings != nullptr) warn_of_frame(path, *image, *warnings);
+    if (has_16_bits && camera.detector && camera.detector->bits < 16) {
+        if (const Status good = take_upper_bits(path, camera, camera.detector->bits, *image); !good)
+            return good.error();
     }
-    if (expected == CV_8UC3) cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
-    std::vector<std::uint8_t> frame(image.total() * image.elemSize());
-    std::memcpy(frame.data(), image.data, frame.size());
+    scale_to(has_16_bits ? 65535 : 255, *image);
+    if (!has_16_bits) return std::vector<std::uint8_t>(image->samples.begin(), image->samples.end());
+    std::vector<std::uint8_t> frame(2 * image->samples.size());
+    std::memcpy(frame.data(), image->samples.data(), frame.size());
     return frame;
 }
 
@@ -233,14 +263,15 @@ Status write_image(const std::string& path, const RenderedFrame& frame) {
                                : write_bytes(path, "", frame.bytes.data(), frame.bytes.size());
 }
 
-Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera) {
+Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera,
+                                             std::vector<std::string>* warnings) {
     const Result<std::string> file = read_file(path);
     if (!file) return file.error();
     if (extension_of(path) == ".raw") return std::vector<std::uint8_t>(file->begin(), file->end());
     if (camera.format == PixelFormat::yuyv)
         return Error{fmt::format("camera \"{}\" is YUYV: expected the device's bytes, FILE.raw", camera.name),
                      path};
-    return decode_frame(path, *file, camera);
+    return decode_frame(path, *file, camera, warnings);
 }
 
 Status write_pfm(const std::string& path, int width, int height, std::span<const double> values) {

@@ -40,11 +40,13 @@ Status check_image_name(const std::string& path);
 /// Errors: an unknown extension; a path that cannot be written.
 Status write_image(const std::string& path, const RenderedFrame& frame);
 
-/// Reads a frame as the camera outputs it, byte for byte: from .raw, or from another image (PNG, TIFF, PGM ...)
-/// with the camera's size and the channels and bits of its format, as write_image writes it: samples of 9 to 15
-/// bits in the upper bits of 16. Errors: a file that cannot be read; a size or pixel type that is not the camera's;
-/// YUYV, whose bytes an image file does not hold.
-Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera);
+/// Reads a frame as the camera outputs it: from .raw byte for byte, or from another image (decode_image) with the
+/// camera's size and the channels of its format. Samples of full scale are the largest of the format, so a PGM
+/// whose maxval is 4095 is scaled; files of 16 bits hold samples of 9 to 15 bits in the upper bits, as write_image
+/// writes them. Errors: a file that cannot be read; a size or pixel type that is not the camera's; YUYV, whose
+/// bytes an image file does not hold. `warnings`: where sentences go about what the file declares and is not used.
+Result<std::vector<std::uint8_t>> read_frame(const std::string& path, const Camera& camera,
+                                             std::vector<std::string>* warnings = nullptr);
 
 /// Writes one 32-bit float a pixel as a grey PFM, little-endian, rows from the bottom. `values`: row by row from
 /// the top. Error: a path that cannot be written.

@@ -150,8 +150,12 @@ private:
         return -1;
     }
 
-    static Result<Texture> read(const MeshTexture& t, const TextureUse& use) {
-        return t.bytes.empty() ? read_texture(t.file, use) : decode_texture(t.file, t.bytes, use);
+    Result<Texture> read(const MeshTexture& t, const TextureUse& use) {
+        std::vector<std::string> warnings;
+        Result<Texture> texture = t.bytes.empty() ? read_texture(t.file, use, &warnings)
+                                                  : decode_texture(t.file, t.bytes, use, &warnings);
+        for (std::string& what : warnings) warn(std::move(what));
+        return texture;
     }
 
     /// Each image is read once for each use of it.

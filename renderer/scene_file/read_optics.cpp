@@ -77,14 +77,14 @@ std::optional<Lens> read_lens(TableReader& camera, std::optional<Detector>& dete
 
 /// Reads the image of a point spread function, whose samples must be within the reach of the filter.
 void read_point_spread_keys_of_image(TableReader& table, PointSpreadFunction& spread,
-                                     const std::filesystem::path& folder) {
+                                     const std::filesystem::path& folder, std::vector<std::string>& warnings) {
     const auto name = table.text("image");
     for (const char* key : {"samples_per_px", "centre"})
         if (!name) table.refuse(key, "there is no image");
     table.read("samples_per_px", spread.samples_per_px);
     const auto centre = table.pair("centre");
     if (!name) return;
-    Result<std::shared_ptr<PointSpreadImage>> image = read_point_spread_image((folder / *name).string());
+    Result<std::shared_ptr<PointSpreadImage>> image = read_point_spread_image((folder / *name).string(), &warnings);
     if (!image) return table.fail("image", image.error().text());
     PointSpreadImage& i = **image;
     if (centre) i.centre_x = (*centre)[0], i.centre_y = (*centre)[1];
@@ -97,13 +97,14 @@ void read_point_spread_keys_of_image(TableReader& table, PointSpreadFunction& sp
 }
 
 std::optional<PointSpreadFunction> read_point_spread(TableReader& camera, const std::optional<Detector>& detector,
-                                                     const std::filesystem::path& folder) {
+                                                     const std::filesystem::path& folder,
+                                                     std::vector<std::string>& warnings) {
     auto table = camera.table("psf");
     if (!table) return std::nullopt;
     PointSpreadFunction spread;
     table->read("sigma_px", spread.sigma_px);
     const auto wavelength_m = table->number("wavelength_m");
-    read_point_spread_keys_of_image(*table, spread, folder);
+    read_point_spread_keys_of_image(*table, spread, folder, warnings);
     if (!table->has("sigma_px") && !table->has("wavelength_m") && !table->has("image"))
         table->require("sigma_px", "a Gaussian's standard deviation, or wavelength_m, or an image");
     if (wavelength_m && !detector)
@@ -143,9 +144,10 @@ std::optional<Ghost> read_ghost(TableReader& camera, bool has_sun) {
 
 constinit const TableKeys kOpticsKeys{.rows = kOpticsRows};
 
-void read_optics(TableReader& table, Camera& camera, bool has_sun, const std::filesystem::path& folder) {
+void read_optics(TableReader& table, Camera& camera, bool has_sun, const std::filesystem::path& folder,
+                 std::vector<std::string>& warnings) {
     camera.lens = read_lens(table, camera.detector);
-    camera.point_spread = read_point_spread(table, camera.detector, folder);
+    camera.point_spread = read_point_spread(table, camera.detector, folder, warnings);
     camera.vignetting = read_vignetting(table);
     table.read("veiling_glare", camera.veiling_glare);
     camera.ghost = read_ghost(table, has_sun);

@@ -201,7 +201,7 @@ void refuse_wide_field(TableReader& table, const Camera& camera) {
                                        off_axis_deg, kWidest_deg));
 }
 
-Camera read_camera(TableReader& table, std::vector<std::string>& names, const SceneReading& reading) {
+Camera read_camera(TableReader& table, std::vector<std::string>& names, SceneReading& reading) {
     const Scene& scene = reading.scene;
     const std::filesystem::path& folder = reading.folder;
     Camera camera;
@@ -226,7 +226,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, const Sc
     camera.detector = read_detector(table, camera.period_ns);
     camera.shutter = read_shutter(table, camera);
     camera.control = read_control(table, camera);
-    read_optics(table, camera, scene.sun.has_value(), folder);
+    read_optics(table, camera, scene.sun.has_value(), folder, reading.scene.warnings);
     if (camera.lens) refuse_wide_field(table, camera);
     camera.white_radiance = table.number("white_radiance").value_or(white_radiance(scene));
     refuse_keys_of_detector(table);

@@ -74,7 +74,8 @@ void read_sensors(TableReader& root, SceneReading& reading);
 /// Resolution and projection of a camera; paths in it start at `folder`.
 void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder);
 /// Lens, point spread, vignetting, glare and ghost of a camera, after its detector; paths start at `folder`.
-void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const std::filesystem::path& folder);
+void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const std::filesystem::path& folder,
+                 std::vector<std::string>& warnings);
 /// A [[lidar]]; paths start at `folder`.
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
                  const std::filesystem::path& folder);

@@ -206,7 +206,7 @@ TEST(TextureFile, OtherFormatsAndTooManyPixelsAreRefusedBeforeTheyAreDecoded) {
     };
     test::write_image_file(folder / "t.ras", cv::Mat(1, 1, CV_8UC3, cv::Scalar(1, 2, 3)));  // Sun raster
     EXPECT_EQ(error_of(folder / "t.ras"),
-              ": not an image that can be read, expected PNG, JPEG, TIFF, WebP, BMP or PNM");
+              ": has the format Sun raster, expected PNG, JPEG, TIFF, WebP, BMP, PNM or PAM");
     const std::string words = " pixels, expected at most 268435456 of them";
     EXPECT_EQ(error_of(folder.write("t.ppm", "P6 # comment 1 1\n20000 20000\n255\n")),
               ": an image of 20000 x 20000" + words);

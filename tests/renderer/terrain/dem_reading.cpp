@@ -6,12 +6,14 @@
 #include <sys/stat.h>
 
 #include <cmath>
+#include <set>
 
 #include "base/constants.h"
 #include "base/program_beside.h"
 #include "renderer/geometry/tracer.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
+#include "tests/support/image_bytes.h"
 #include "tests/support/paths.h"
 #include "tests/support/shapes.h"
 
@@ -73,6 +75,43 @@ INSTANTIATE_TEST_SUITE_P(All, DemFormats,
                                          Format{"Pds3", "pds3.lbl"}, Format{"Pds4", "pds4.xml"},
                                          Format{"Png", "heights.png"}),
                          [](const auto& f) { return f.param.name; });
+
+TEST(Dem, APaletteGivesItsGreysAndNoColours) {
+    NEEDS_GDAL();
+    const MemoryFolder folder;
+    std::string greys, colours;
+    for (int i = 0; i < 3; ++i) greys += std::string(3, static_cast<char>(50 * (i + 1))), colours += "\x0a\x14\x1e";
+    const auto heights_of = [&](const std::string& path) {
+        DemRequest r = request_of(path);
+        r.post_spacing_m = 10;
+        const auto t = read_dem_in_process(r);
+        EXPECT_TRUE(t) << t.error().text();
+        std::set<double> heights;
+        for (std::size_t i = 0; t && i < t->positions.size(); ++i)
+            heights.insert(t->origin_m.z + static_cast<double>(t->positions[i].z));
+        return heights;
+    };
+    test::TiffFile tiff{.width = 3, .height = 3, .bits = 8, .photometric = 3, .palette = {}};
+    tiff.palette.resize(3 * 256);
+    for (std::size_t i = 0; i < tiff.palette.size(); ++i)
+        tiff.palette[i] = i % 256 < 3 ? 257 * 50 * (i % 256 + 1) : 0;
+    const auto index = [](int x, int y, int) { return static_cast<std::uint64_t>((x + y) % 3); };
+    const std::string indices("\0\1\2\1\2\0\2\0\1", 9);
+    const std::set<double> expected{50, 100, 150};
+    EXPECT_EQ(heights_of(folder.write("d.png", test::palette_png(3, 3, indices, greys))), expected);
+    EXPECT_EQ(heights_of(folder.write("d.tif", tiff.bytes(index))), expected);
+
+    tiff.palette[256] = 0;
+    for (const std::string& path : {folder.write("c.png", test::palette_png(3, 3, indices, colours)),
+                                    folder.write("c.tif", tiff.bytes(index))}) {
+        DemRequest r = request_of(path);
+        r.post_spacing_m = 10;
+        const auto t = read_dem_in_process(r);
+        ASSERT_FALSE(t) << path;
+        EXPECT_EQ(t.error().file, path);
+        EXPECT_NE(t.error().what.find("its numbers are indices of a palette"), std::string::npos) << t.error().what;
+    }
+}
 
 TEST(Dem, NoDataIsAHole) {
     NEEDS_GDAL();

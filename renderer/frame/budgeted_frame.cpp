@@ -280,7 +280,9 @@ private:
         for (int stride = first; stride >= last; stride /= 2) {
             if (stride < first && !take_lattice(*frame_, stride)) return;
             account_.step = step_of(stride);
-            if (stride == 2 && !direct_alone_ && worth_sparse(1) && refine_sparse()) return;
+            // A replay takes one pass for one pixel in 2 x 2, whole or in part, before further samples.
+            const bool one_pass = first == 2 || fills_ == 2;
+            if (stride == 2 && one_pass && !direct_alone_ && worth_sparse(1) && refine_sparse()) return;
         }
     }
     /// The first image: one pixel in 2 x 2, whose batches are full, if that is expected to fit; else one in 4 x 4.
@@ -569,15 +571,11 @@ private:
         if (to_show_ == ToShow::nothing) return;
         if (to_show_ == ToShow::filled) reconstruct();
         const std::int64_t start = now_ns();
-        if (to_show_ == ToShow::centres) passes_.show_centres(centre_, out_);
-        if (to_show_ == ToShow::filled) {
-            passes_.show_filled(*frame_, out_, variance_);
-            if (account_.step != FrameStep::no_indirect) account_.standard_error = passes_.standard_error();
-        }
-        if (to_show_ == ToShow::means) {
-            passes_.show_means(sample_, stage_, filled_, out_, variance_);
-            account_.standard_error = passes_.standard_error();
-        }
+        if (to_show_ == ToShow::centres) passes_.show_centres(centre_, out_, variance_);
+        if (to_show_ == ToShow::filled) passes_.show_filled(*frame_, out_, variance_);
+        if (to_show_ == ToShow::means) passes_.show_means(sample_, stage_, filled_, out_, variance_);
+        // What paths would have added is not known.
+        if (account_.step != FrameStep::no_indirect) account_.standard_error = passes_.standard_error();
         costs_.record(Of::show, out_.pixels.size(), now_ns() - start);
         to_show_ = ToShow::nothing;
     }

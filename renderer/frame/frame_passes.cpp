@@ -287,13 +287,31 @@ PassCount FramePasses::centres(const Frame& f, const PassLimit& limit) {
                       [&](Worker& w, const Tile& t) { w.centres(t, camera_.width, kAllPlaces, g_buffer_); });
 }
 
-void FramePasses::show_centres(const Frame& f, RadianceImage& out) {
+void FramePasses::show_centres(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
     fill_background(out);
-    over_tiles(f, Sums::counts, {}, [&](Worker&, const Tile& t) {
+    const double each = weight_of_error_tiles(variance);
+    over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         const GBufferTile& centres = g_buffer_.tile(t.index);
         put_pixels(t, centres.r, centres.g, centres.b, out);
-        add_subpixel_light(f, t, out, nullptr);
+        if (variance != nullptr || estimates(t.index, kManyFilledTiles)) {
+            TileContrast contrast;
+            g_buffer_.contrast(f, t.index, contrast);
+            w.error.add_centres(contrast, each);
+            if (variance != nullptr)
+                t.each_pixel([&](int x, int y, std::size_t at) {
+                    (*variance)[index_of(x, y, out.width)] = contrast.centre[at];
+                });
+        }
+        add_subpixel_light(f, t, out, variance);
     });
+}
+
+/// Of the tiles from which the error of centres and filled images is estimated: all if the variance is wanted.
+double FramePasses::weight_of_error_tiles(const std::vector<float>* variance) const {
+    if (variance != nullptr) return 1;
+    const auto counted = std::count_if(tiles_.begin(), tiles_.end(),
+                                       [&](std::uint32_t tile) { return estimates(tile, kManyFilledTiles); });
+    return counted > 0 ? static_cast<double>(tiles_.size()) / static_cast<double>(counted) : 0;
 }
 
 void FramePasses::begin_fill() {
@@ -321,15 +339,11 @@ PassCount FramePasses::fill(const Frame& f, PixelFill::Stage from, PixelFill::St
 void FramePasses::show_filled(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
     const double part = part_not_noise(f);
     fill_background(out);
-    const auto counts = [&](std::uint32_t tile) {
-        return variance != nullptr || estimates(tile, kManyFilledTiles);
-    };
-    const auto counted = static_cast<double>(std::count_if(tiles_.begin(), tiles_.end(), counts));
-    const double each = static_cast<double>(tiles_.size()) / counted;
+    const double each = weight_of_error_tiles(variance);
     over_tiles(f, Sums::errors, {}, [&](Worker& w, const Tile& t) {
         const GBufferTile& pixels = g_buffer_.tile(t.index);
         put_pixels(t, pixels.r, pixels.g, pixels.b, out);
-        if (counts(t.index)) {
+        if (variance != nullptr || estimates(t.index, kManyFilledTiles)) {
             TileContrast contrast;
             g_buffer_.contrast(f, t.index, contrast);
             t.each_pixel([&](int x, int y, std::size_t at) {

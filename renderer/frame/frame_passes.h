@@ -62,7 +62,8 @@ public:
     enum class Tiles : std::uint8_t { all, pilot, all_but_pilot };
     /// Traces the centres of all pixels.
     PassCount centres(const Frame& f, const PassLimit& limit);
-    void show_centres(const Frame& f, RadianceImage& out);
+    /// Writes the centres to the image.
+    void show_centres(const Frame& f, RadianceImage& out, std::vector<float>* variance);
 
     /// Allocates the memory of `begin_fill`, which may be needed in any frame within a budget.
     void keep_fill() {
@@ -99,7 +100,7 @@ public:
     void show_means(const Frame& f, SamplePlan::Stage stage, bool filled, RadianceImage& out,
                     std::vector<float>* variance);
 
-    /// Error of the image last written by `uniform` or `show_means`, or of the centres that the plan was made from.
+    /// Error of the image last written, or of the centres that the last plan was made from.
     [[nodiscard]] double standard_error() const noexcept;
 
     /// Returns the time per phase since the last call, if FrameSettings::times is set.
@@ -120,6 +121,7 @@ private:
     [[nodiscard]] bool estimates(std::uint32_t tile, std::size_t many) const noexcept;
     [[nodiscard]] bool fills_g_buffer(std::uint32_t tile) const noexcept;
     void estimate_centres(const Frame& f);
+    [[nodiscard]] double weight_of_error_tiles(const std::vector<float>* variance) const;
 
     const Camera& camera_;
     TileCulling culling_;

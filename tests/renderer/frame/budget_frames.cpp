@@ -124,6 +124,24 @@ TEST(BudgetFrame, IsMadeAnewFromItsAccount) {
         }
 }
 
+TEST(BudgetFrame, IsMadeAnewFromItsAccountIfTheClockChose) {
+    const BudgetView v = craft_over_a_globe(360, 255);
+    CameraRenderer renderer(v.render_scene, v.camera);
+    for (const Method method : {Method::direct, Method::path}) {
+        render(renderer, v, rays_a_pixel(v, 60, 0, method));  // measures costs
+        for (std::uint32_t k = 1; k <= 60; ++k) {
+            FrameSettings s = rays_a_pixel(v, 0, k, method);
+            s.budget.kind = BudgetKind::time;
+            s.budget.deadline_ns = now_ns() + std::int64_t{300'000} * k;
+            const Shown shown = render(renderer, v, s);
+            const Shown again = render(v, replay_of(s, shown.account));
+            EXPECT_TRUE(same_bytes(shown.image, again.image)) << k << " step " << int(shown.account.step);
+            EXPECT_EQ(shown.account.passes, again.account.passes) << k;
+            EXPECT_EQ(shown.account.standard_error, again.account.standard_error) << k;
+        }
+    }
+}
+
 TEST(BudgetFrame, StepsGoDownOneByOneAndEachShowsAWholeImage) {
     const BudgetView v = craft_over_a_globe();
     CameraRenderer renderer(v.render_scene, v.camera);

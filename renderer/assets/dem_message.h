@@ -14,7 +14,8 @@ bool transfer(Stream& stream, DemMessage& m) {
     if (!m.error.empty()) return true;
     TerrainMesh& t = m.terrain;
     return plain(stream, t.origin_m) && plain(stream, t.summary) && array(stream, t.positions) &&
-           array(stream, t.normals) && array(stream, t.uvs) && array(stream, t.faces);
+           array(stream, t.normals) && array(stream, t.uvs) && array(stream, t.faces) &&
+           list(stream, t.warnings, [&](std::string& text) { return array(stream, text); });
 }
 
 }  // namespace narpa::mesh_message

@@ -7,11 +7,13 @@
 #include <gdal_frmts.h>
 #include <ogr_srs_api.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
+#include "renderer/dem_reader/height_declaration.h"
 #include "renderer/dem_reader/one_folder.h"
 
 namespace narpa {
@@ -31,18 +33,13 @@ std::string gdal_words() {
 
 class GdalSource final : public HeightSource {
 public:
-    struct Meaning {
-        double scale = 1, offset_m = 0;  ///< height = scale * number + offset
-        double no_data = DemRequest::kFromFile;
-        std::vector<double> palette{};  ///< the number that each stored number stands for; empty: itself
-    };
-
-    GdalSource(GDALDatasetH file, const Meaning& meaning)
+    GdalSource(GDALDatasetH file, HeightDeclaration declared, std::shared_ptr<VoidWatch> voids)
         : file_(file),
           band_(GDALGetRasterBand(file, 1)),
           columns_(GDALGetRasterXSize(file)),
           rows_(GDALGetRasterYSize(file)),
-          meaning_(meaning),
+          declared_(std::move(declared)),
+          voids_(std::move(voids)),
           masked_((GDALGetMaskFlags(band_) & GMF_ALL_VALID) == 0) {}
     ~GdalSource() override { GDALClose(file_); }
 
@@ -59,29 +56,48 @@ public:
                              count, GDT_Byte, 0, 0) != CE_None)
                 return false;
         }
+        numbers_.resize(n);
+        std::uint64_t unusable = 0;
         for (std::size_t i = 0; i < n; ++i) {
-            const double number = in_palette(heights[i]), h = meaning_.scale * number + meaning_.offset_m;
-            const bool known =
-                (!masked_ || mask_[i] != 0) && number != meaning_.no_data && std::abs(h) <= kHighest_m;
-            heights[i] = known ? h : kNoHeight;
+            const double number = numbers_[i] = in_palette(heights[i]);
+            const double h = declared_.metres_per_number * number + declared_.offset_m;
+            const bool known = (!masked_ || mask_[i] != 0) && is_valid(number), usable = std::abs(h) <= kHighest_m;
+            unusable += known && !usable;
+            heights[i] = known && usable ? h : kNoHeight;
         }
+        tell_voids(row, count, heights, unusable);
         return true;
     }
 
 private:
     /// NaN beyond the palette.
     [[nodiscard]] double in_palette(double number) const {
-        if (meaning_.palette.empty()) return number;
-        const bool is_entry = number >= 0 && number < static_cast<double>(meaning_.palette.size());
-        return is_entry ? meaning_.palette[static_cast<std::size_t>(number)] : kNoHeight;
+        if (declared_.palette.empty()) return number;
+        const bool is_entry = number >= 0 && number < static_cast<double>(declared_.palette.size());
+        return is_entry ? declared_.palette[static_cast<std::size_t>(number)] : kNoHeight;
+    }
+
+    [[nodiscard]] bool is_valid(double number) const {
+        const bool in_range = number >= declared_.lowest && number <= declared_.highest;  // false for NaN
+        return in_range && std::ranges::find(declared_.no_data, number) == declared_.no_data.end();
+    }
+
+    void tell_voids(int row, int count, const double* heights, std::uint64_t unusable) {
+        if (row == voids_->next_row()) voids_->count_unusable(unusable);
+        const auto width = static_cast<std::size_t>(columns_);
+        for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
+            voids_->see_row(row + static_cast<int>(i), {numbers_.data() + i * width, width},
+                            {heights + i * width, width});
     }
 
     GDALDatasetH file_;
     GDALRasterBandH band_;
     int columns_, rows_;
-    Meaning meaning_;
+    HeightDeclaration declared_;
+    std::shared_ptr<VoidWatch> voids_;
     bool masked_;
     std::vector<unsigned char> mask_;
+    std::vector<double> numbers_;
 };
 
 /// A grid that goes around the planet: repeats the first column as the last, and adds a row at each pole from which
@@ -268,51 +284,22 @@ private:
     OGRCoordinateTransformationH transform_ = nullptr;
 };
 
-Status check_band(GDALDatasetH file) {
-    if (GDALGetRasterCount(file) < 1) return Error{"it has no raster band"};
-    if (GDALGetRasterCount(file) > 1)
-        return Error{fmt::format("it has {} bands, expected one, of heights", GDALGetRasterCount(file))};
-    const GDALRasterBandH band = GDALGetRasterBand(file, 1);
-    if (GDALDataTypeIsComplex(GDALGetRasterDataType(band)) != 0)
-        return Error{"its numbers are complex, expected heights"};
-    return Ok{};
-}
-
-/// The greys of a colour table; empty where the band has none. Numbers that are indices of colours are no heights.
-Result<std::vector<double>> palette_of(GDALRasterBandH band) {
-    std::vector<double> greys;
-    const GDALColorTableH table = GDALGetRasterColorTable(band);
-    for (int i = 0, count = table == nullptr ? 0 : GDALGetColorEntryCount(table); i < count; ++i) {
-        const GDALColorEntry& c = *GDALGetColorEntry(table, i);
-        const bool is_grey = GDALGetPaletteInterpretation(table) == GPI_Gray || (c.c1 == c.c2 && c.c2 == c.c3);
-        if (!is_grey)
-            return Error{
-                fmt::format("its numbers are indices of a palette (colour table) with colours, {} being "
-                            "({}, {}, {}), expected heights, or a palette of greys",
-                            i, c.c1, c.c2, c.c3)};
-        greys.push_back(c.c4 == 0 ? kNoHeight : c.c1);  // the fourth is opacity
+/// Watches for the limits of the numbers' type. Those of bytes and floats are no usual marks, nor is an unsigned 0.
+std::shared_ptr<VoidWatch> void_watch(GDALDataType type) {
+    switch (type) {
+        case GDT_Int16: return std::make_shared<VoidWatch>(-32768, 32767);
+        case GDT_UInt16: return std::make_shared<VoidWatch>(kNoHeight, 65535);
+        case GDT_Int32: return std::make_shared<VoidWatch>(-2147483648.0, 2147483647.0);
+        case GDT_UInt32: return std::make_shared<VoidWatch>(kNoHeight, 4294967295.0);
+        default: return std::make_shared<VoidWatch>(kNoHeight, kNoHeight);
     }
-    return greys;
-}
-
-GdalSource::Meaning meaning_of(GDALRasterBandH band, const DemRequest& r, double radius_m) {
-    int known = 0;
-    GdalSource::Meaning m;
-    m.scale = GDALGetRasterScale(band, &known);
-    if (std::isfinite(r.scale)) m.scale = r.scale;
-    m.offset_m = GDALGetRasterOffset(band, &known);
-    if (std::isfinite(r.offset_m)) m.offset_m = r.offset_m;
-    if (r.radii) m.offset_m -= radius_m;
-    m.no_data = r.no_data;
-    return m;
 }
 
 void start_gdal() {
     CPLSetErrorHandler(CPLQuietErrorHandler);
     CPLSetConfigOption("GDAL_CACHEMAX", "64");  // MiB
     CPLSetConfigOption("GDAL_NUM_THREADS", "1");
-    CPLSetConfigOption("GDAL_PAM_ENABLED", "NO");  // no .aux.xml is read or written
-    OSRSetPROJEnableNetwork(FALSE);                // whatever the environment says
+    OSRSetPROJEnableNetwork(FALSE);  // whatever the environment says
     GDALRegister_GTiff(), GDALRegister_PDS(), GDALRegister_PDS4(), GDALRegister_ISIS3(), GDALRegister_PNG();
 }
 
@@ -325,17 +312,16 @@ Result<OpenDem> open_with_gdal(const DemRequest& request) {
     if (file == nullptr)
         return Error{fmt::format("not a DEM that can be read, expected GeoTIFF, PDS3, PDS4, ISIS3 or PNG: {}",
                                  gdal_words())};
-    if (const Status good = check_band(file); !good) return good.error();
+    auto declared = read_height_declaration(file, request);
+    if (!declared) return declared.error();
     auto* geo = new Georeference;  // lives as long as this process, as the placement calls it
     if (const Status good = geo->read(file, request); !good) return good.error();
     OpenDem dem;
     dem.placement = geo->placement();
-    const GDALRasterBandH band = GDALGetRasterBand(file, 1);
-    GdalSource::Meaning meaning = meaning_of(band, request, dem.placement.equatorial_m);
-    auto palette = palette_of(band);
-    if (!palette) return palette.error();
-    meaning.palette = std::move(*palette);
-    dem.heights = std::make_unique<GdalSource>(file, meaning);
+    dem.warnings = std::move(declared->warnings);
+    if (request.radii) declared->offset_m -= dem.placement.equatorial_m;
+    dem.voids = void_watch(GDALGetRasterDataType(GDALGetRasterBand(file, 1)));
+    dem.heights = std::make_unique<GdalSource>(file, std::move(*declared), dem.voids);
     if (geo->around())
         dem.heights = std::make_unique<WholePlanet>(std::move(dem.heights), dem.placement.first_pole != 0,
                                                     dem.placement.last_pole != 0);
@@ -343,6 +329,7 @@ Result<OpenDem> open_with_gdal(const DemRequest& request) {
     std::array<Vec3, 4> p{Vec3{c - 0.25, w, 0}, Vec3{c + 0.25, w, 0}, Vec3{c, w - 0.25, 0}, Vec3{c, w + 0.25, 0}};
     if (dem.heights->columns() < 2 || dem.heights->rows() < 2 || !dem.placement.place(p)) return dem;
     dem.spacing = {2 * norm(p[1] - p[0]), 2 * norm(p[3] - p[2])};
+    dem.voids->set_spacing(std::max(dem.spacing.x_m, dem.spacing.y_m));
     return dem;
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/result.h"
 #include "renderer/assets/dem_process.h"
+#include "renderer/dem_reader/void_watch.h"
 
 namespace narpa {
 
@@ -14,6 +15,8 @@ struct OpenDem {
     std::unique_ptr<HeightSource> heights;
     Placement placement;
     PostSpacing spacing;
+    std::vector<std::string> warnings;  ///< about what the file declares and is not used
+    std::shared_ptr<VoidWatch> voids;   ///< complete when all heights have been read
 };
 
 /// GeoTIFF, PDS3, PDS4, ISIS3 cubes and PNG; the first band. Errors say what is wrong, without the file's name.

@@ -1,5 +1,6 @@
 // narpa-dem-reader FILE REQUEST MEMORY_BYTES SECONDS - reads a DEM with GDAL, within limits of memory and time, and
 // writes the terrain to standard output as a DemMessage. narpa starts it for each DEM of a scene.
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -32,6 +33,21 @@ private:
     std::string name_;
 };
 
+/// Distances from the centre taken for heights, or heights for distances.
+std::string warning_of_radii(const DemRequest& request, double equatorial_m, const TerrainMesh::Summary& s) {
+    if (!request.radii && s.lowest_m > 0.5 * equatorial_m)
+        return fmt::format(
+            "its heights are from {:.6g} to {:.6g} m, and the radius of its ellipsoid is {:.6g} m: "
+            "distances from the centre? They need has = \"radii\"",
+            s.lowest_m, s.highest_m, equatorial_m);
+    if (request.radii && s.highest_m < -0.5 * equatorial_m)
+        return fmt::format(
+            "its numbers are up to {:.6g} m, and the radius of its ellipsoid is {:.6g} m: heights? They "
+            "need has = \"heights\"",
+            s.highest_m + equatorial_m, equatorial_m);
+    return "";
+}
+
 Result<TerrainMesh> read_terrain(const DemRequest& request, int terminal) {
     auto dem = open_with_gdal(request);
     if (!dem) return dem.error();
@@ -48,8 +64,14 @@ Result<TerrainMesh> read_terrain(const DemRequest& request, int terminal) {
         dem->placement.refinement_factor = finer;
     }
     ProgressLine line(terminal, request.path);
-    return build_terrain(detailed ? *detailed : *dem->heights, dem->placement, request.options,
-                         [&](double part) { line(part); });
+    auto terrain = build_terrain(detailed ? *detailed : *dem->heights, dem->placement, request.options,
+                                 [&](double part) { line(part); });
+    if (!terrain) return terrain;
+    terrain->warnings = dem->voids->warnings();
+    if (auto text = warning_of_radii(request, dem->placement.equatorial_m, terrain->summary); !text.empty())
+        terrain->warnings.push_back(std::move(text));
+    terrain->warnings.insert(terrain->warnings.begin(), dem->warnings.begin(), dem->warnings.end());
+    return terrain;
 }
 
 }  // namespace

@@ -129,6 +129,8 @@ void load_dem(const NamedDem& named, SceneReading& reading) {
     take_sensors(request, named.body, scene);
     Result<TerrainMesh> terrain = read_dem_in_process(request);
     if (!terrain) return reading.problems.add(named.place, "dem: " + terrain.error().text());
+    for (const std::string& warning : terrain->warnings)
+        scene.warnings.push_back(fmt::format("{}: {}", request.path, warning));
     if (terrain->summary.error_px > request.options.error_px)
         scene.warnings.push_back(fmt::format(
             "{}: a budget of {} MiB keeps the error of the terrain within {:.2g} px, not {:.2g} px", request.path,

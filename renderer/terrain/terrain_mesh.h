@@ -46,6 +46,7 @@ struct TerrainMesh {
         std::uint64_t full_triangles = 0;      ///< of the whole DEM
         std::array<std::uint32_t, 7> tiles{};  ///< that are sampled at every 2^i-th post
     } summary;
+    std::vector<std::string> warnings{};  ///< clauses about the DEM: what it declares and is not used, likely voids
 };
 
 /// `progress` is called with the completed share, 0 to 1. Errors say what is wrong with the DEM, without its name.

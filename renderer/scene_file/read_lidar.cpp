@@ -140,7 +140,8 @@ void read_mode(TableReader& table, const LidarMake& make, const std::filesystem:
     table.fail(error.line > 0 ? "calibration" : table.has("columns") ? "columns" : "rate_hz", error.text());
 }
 
-LidarSettings read_settings(TableReader& table, const LidarMake& make, const std::filesystem::path& folder) {
+LidarSettings read_settings(TableReader& table, const LidarMake& make, const std::filesystem::path& folder,
+                            std::vector<std::string>& warnings) {
     LidarSettings settings;
     settings.rate_hz =
         table.number("rate_hz", {.low = make.rate_hz_min, .high = make.rate_hz_max}).value_or(make.rate_hz_default);
@@ -152,7 +153,7 @@ LidarSettings read_settings(TableReader& table, const LidarMake& make, const std
     settings.returns = read_returns(table, make);
     if (make.beams == 0) table.refuse("calibration", fmt::format("a {} takes none", make.name));
     if (const auto file = table.text("calibration")) {
-        auto beams = read_lidar_calibration((folder / *file).string(), make.beams);
+        auto beams = read_lidar_calibration((folder / *file).string(), make.beams, &warnings);
         if (beams)
             settings.beams = *std::move(beams);
         else
@@ -169,7 +170,7 @@ bool lights_an_area(const Lidar& lidar) {
 
 constinit const TableKeys kLidarKeys{.rows = kLidarRows, .parts = {&kMountingKeys}};
 
-Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
+Lidar read_lidar(TableReader& table, std::vector<std::string>& names, Scene& scene,
                  const std::filesystem::path& folder) {
     Lidar lidar;
     lidar.name = read_name(table, names);
@@ -177,7 +178,7 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scen
     lidar.mount = mounting.mount;
     lidar.T_mount_lidar = mounting.T_mount_sensor;
     const LidarMake make = read_make(table, folder);
-    lidar.model = make.configure(read_settings(table, make, folder));
+    lidar.model = make.configure(read_settings(table, make, folder, scene.warnings));
     const double range_m_most = lidar.model->spec().range_m_max;
     lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = range_m_most, .low_open = true})
                             .value_or(make.range_m_default);

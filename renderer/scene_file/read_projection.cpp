@@ -105,13 +105,15 @@ void read_field_of_view(TableReader& table, const Camera& camera, ProjectionPara
 }
 
 /// Size and projection from a file.
-void read_calibration_key(TableReader& table, Camera& camera, const std::filesystem::path& folder) {
+void read_calibration_key(TableReader& table, Camera& camera, const std::filesystem::path& folder,
+                          std::vector<std::string>& warnings) {
     const auto name = table.text("calibration");
     if (!name) return;
     for (const char* key : {"distortion", "projection"})
         table.refuse(key, "the calibration has one, expected one of the two");
     const Result<Calibration> c = read_calibration((folder / *name).string());
     if (!c) return table.fail("calibration", c.error().text());
+    for (const std::string& warning : c->warnings) warnings.push_back(fmt::format("{}: {}", *name, warning));
     if (table.has("resolution") && (camera.width != c->width || camera.height != c->height))
         table.fail("resolution",
                    fmt::format("got {} x {}, expected that of the calibration, {} x {}, or no such key",
@@ -137,7 +139,8 @@ void check_one_is_given(TableReader& table) {
 
 constinit const TableKeys kProjectionKeys{.rows = kProjectionRows};
 
-void read_projection(TableReader& table, Camera& camera, const std::filesystem::path& folder) {
+void read_projection(TableReader& table, Camera& camera, const std::filesystem::path& folder,
+                     std::vector<std::string>& warnings) {
     read_resolution(table, camera);
     ProjectionParameters p = read_projection_kind(table);
     p.pinhole = {1, 1, 0.5 * (camera.width - 1), 0.5 * (camera.height - 1)};
@@ -145,7 +148,7 @@ void read_projection(TableReader& table, Camera& camera, const std::filesystem::
     if (auto intrinsics = table.table("intrinsics")) read_intrinsics(*intrinsics, p.pinhole);
     read_field_of_view(table, camera, p);
     camera.model = make_projection(p);
-    read_calibration_key(table, camera, folder);
+    read_calibration_key(table, camera, folder, warnings);
     assert(camera.model);
 }
 

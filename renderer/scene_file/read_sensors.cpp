@@ -210,7 +210,7 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, SceneRea
     camera.mount = mounting.mount;
     camera.T_mount_camera = mounting.T_mount_sensor;
     read_tracking(table, reading, camera);
-    read_projection(table, camera, folder);
+    read_projection(table, camera, folder, reading.scene.warnings);
     if (const auto rate_hz = table.number("rate_hz")) camera.period_ns = std::llround(1e9 / *rate_hz);
     if (scene.render.budget_ns > camera.period_ns)
         table.fail("rate_hz", fmt::format("a period of {} ms, expected at least the budget_ms of [render], {}",

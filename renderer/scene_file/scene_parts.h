@@ -72,12 +72,13 @@ void read_lights(TableReader& root, SceneReading& reading);
 /// [[camera]] and [[lidar]]; bodies and surroundings come first.
 void read_sensors(TableReader& root, SceneReading& reading);
 /// Resolution and projection of a camera; paths in it start at `folder`.
-void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder);
+void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder,
+                     std::vector<std::string>& warnings);
 /// Lens, point spread, vignetting, glare and ghost of a camera, after its detector; paths start at `folder`.
 void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const std::filesystem::path& folder,
                  std::vector<std::string>& warnings);
 /// A [[lidar]]; paths start at `folder`.
-Lidar read_lidar(TableReader& table, std::vector<std::string>& names, const Scene& scene,
+Lidar read_lidar(TableReader& table, std::vector<std::string>& names, Scene& scene,
                  const std::filesystem::path& folder);
 /// `dem` of a body, which has one, without opening it.
 void read_dem(TableReader& body, int material, SceneReading& reading);

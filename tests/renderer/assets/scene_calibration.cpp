@@ -112,7 +112,8 @@ TEST(CalibrationFile, ErrorsNameTheLine) {
     expect_error("610.5", "-1", 5, "camera_matrix: expected [fx, 0, cx");
     expect_error("605.2", ".nan", 8, "camera_matrix: expected finite numbers");
     expect_error("plumb_bob", "fov", 10, "distortion_model \"fov\" is not known here");
-    expect_error("-0.025]", "-0.025, 1]", 12, "got 6, expected 4, 5, 8 or 12");
+    expect_error("-0.025]", "-0.025, 1]", 14, "data has 6 numbers, expected rows * cols = 5");
+    expect_error("cols: 5\n  data: [", "data: [1, ", 12, "got 6, expected 4, 5, 8 or 12");
     expect_error("[-0.35", "[-0.35: {", 14, "is not YAML");
     expect_error("camera_matrix", "kamera_matrix", 0, "expected camera_matrix");
 }

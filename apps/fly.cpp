@@ -80,6 +80,7 @@ public:
         Progress progress("playing " + options_.trajectory);
         progress.show(fmt::format("waiting at most {:g} s for the emulator's clock", options_.wait_s));
         if (auto ready = synchronise(); !ready) return ready;
+        if (auto soon = check_begin(rows); !soon) return soon;
         std::size_t k = 0;
         for (const TrajectoryRow& row : rows) {
             if (stop_flag() || emulator_stops()) break;
@@ -131,6 +132,20 @@ private:
             start_ns_ = (clock_.now_ns() + 300 * kMs) / (100 * kMs) * (100 * kMs);
         }
         return Ok{};
+    }
+
+    /// In real time: refuses a trajectory that would begin days from now, such as one in Unix time.
+    Status check_begin(const std::vector<TrajectoryRow>& rows) const {
+        constexpr std::int64_t kDay_ns = 86'400'000 * kMs;
+        if (options_.lockstep || rows.empty() || rows.front().t_ns + start_ns_ - clock_.now_ns() < kDay_ns)
+            return Ok{};
+        const double first_s = static_cast<double>(rows.front().t_ns) * 1e-9;
+        return Error{
+            fmt::format("the first row is at {:.10g} s, {:.6g} s ahead of the emulator's clock, expected "
+                        "seconds from the start of its run; --start={:.0f} shifts such a time to 0",
+                        first_s, static_cast<double>(rows.front().t_ns + start_ns_ - clock_.now_ns()) * 1e-9,
+                        -std::floor(first_s)),
+            options_.trajectory, rows.front().line};
     }
 
     /// Checks that the emulator's run is still the one at the start, and in the mode of this side. An emulator in

@@ -136,14 +136,14 @@ Status Emulator::open_logs() {
     return Ok{};
 }
 
-std::vector<std::string> Emulator::refusals() const {
+std::vector<std::string> Emulator::texts_of(const PoseRefusals& refusals) const {
     std::vector<std::string> notices;
-    if (can_->too_far_ahead() > 0)
+    if (refusals.too_far_ahead > 0)
         notices.push_back(
             fmt::format("pose commands refused because they are for more than {:g} s ahead (command_ahead_max_s in "
                         "[render]): {}",
-                        world_->scene().render.command_ahead_max_s, can_->too_far_ahead()));
-    for (const RefusedPoses& r : can_->refused_poses()) {
+                        world_->scene().render.command_ahead_max_s, refusals.too_far_ahead));
+    for (const RefusedPoses& r : refusals.bodies) {
         const auto body = std::ranges::find(world_->scene().bodies, r.can_id, &Body::can_id);
         notices.push_back(
             fmt::format("pose commands of \"{}\" (can_id {:#x}) refused: {} as past (not newer than its newest, "
@@ -152,6 +152,11 @@ std::vector<std::string> Emulator::refusals() const {
                         body->name, r.can_id, r.past, static_cast<double>(r.newest_ns) * 1e-9, r.overrun));
     }
     return notices;
+}
+
+void Emulator::tell_refusals(const PoseRefusals& refusals) const {
+    for (const std::string& what : texts_of(refusals))
+        if (options_.on_refusal) options_.on_refusal(what);
 }
 
 std::string Emulator::bodies_without_a_pose() const {
@@ -169,7 +174,9 @@ void Emulator::note_losses() {
     if (const std::string bodies = bodies_without_a_pose(); !bodies.empty() && !options_.lockstep)
         notices_.push_back(
             fmt::format("no pose command was accepted for {}; such a body moves as the scene states", bodies));
-    for (std::string& what : refusals()) notices_.push_back(std::move(what));
+    PoseRefusals refusals;
+    can_->refusals(refusals);
+    for (std::string& what : texts_of(refusals)) notices_.push_back(std::move(what));
     if (const std::uint64_t n = can_->counters().not_logged; n > 0)
         notices_.push_back(
             fmt::format("frames of others that are not in can.log, because there were more than {} a second or the "

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <barrier>
 #include <cassert>
+#include <semaphore>
 #include <thread>
+#include <utility>
 
 #include "base/time.h"
 #include "emulator/emulator.h"
@@ -49,9 +51,16 @@ struct StartClock {
 
 /// What the threads of a real-time run share. The clock starts when all of them are at the barrier.
 struct Emulator::RealTimeRun {
-    explicit RealTimeRun(std::size_t threads) : start(static_cast<std::ptrdiff_t>(threads), StartClock{clock}) {}
+    RealTimeRun(std::size_t threads, std::size_t bodies)
+        : start(static_cast<std::ptrdiff_t>(threads), StartClock{clock}) {
+        refusals.bodies.reserve(bodies);
+    }
     RealTimeClock clock;
     std::barrier<StartClock> start;
+    /// The first refusals, which the CAN thread leaves to another to tell.
+    PoseRefusals refusals{};
+    bool refused = false;
+    std::counting_semaphore<2> news{0};  ///< released with `refused`, and at the end
 };
 
 // --- Telemetry ------------------------------------------------------------
@@ -79,11 +88,16 @@ void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
     threads_->make_real_time(kTracingPriority);
-    RealTimeRun run(1 + sensors_.all.size() + (can_ ? 1 : 0));
+    RealTimeRun run(1 + sensors_.all.size() + (can_ ? 1 : 0), can_ ? can_->commanded_bodies() : 0);
     run.clock.end_at(end_ns_);
     StopFlag sensors_done{false}, observers_done{false};
     std::thread bus;
     if (can_) bus = std::thread([&] { run_bus(run, observers_done); });
+    std::thread teller([&] {
+        name_thread("narpa-notes");
+        run.news.acquire();
+        if (run.refused) tell_refusals(run.refusals);
+    });
     std::vector<std::thread> sensors, observers;
     for (const auto& feed : observers_)
         observers.emplace_back([&, f = feed.get()] { run_observer(*f, sensors_done); });
@@ -100,6 +114,8 @@ void Emulator::run_real_time(const StopFlag& stop) {
     for (std::thread& t : observers) t.join();
     observers_done = true;
     if (bus.joinable()) bus.join();
+    run.news.release();
+    teller.join();
     t_ns_ = std::min(run.clock.now_ns(), run.clock.end_ns());
 }
 
@@ -137,6 +153,10 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
         for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
         }
         send_telemetry(now);
+        if (can_->refuses_poses() && !std::exchange(run.refused, true)) {
+            can_->refusals(run.refusals);
+            run.news.release();
+        }
         // A recorded bus has ended: so does the run. Set once, because an overloaded camera never reaches an end
         // that advances with the time.
         if (clock.end_ns() == Clock::kNever && can_->ended()) clock.end_at(now);
@@ -181,8 +201,11 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             can_->bus().wait(kLockstepWaitNs);
             continue;
         }
-        if (can_->refuses_poses() && !std::exchange(refused, true) && options_.on_refusal)
-            for (const std::string& what : refusals()) options_.on_refusal(what);
+        if (can_->refuses_poses() && !std::exchange(refused, true)) {
+            PoseRefusals refusals;
+            can_->refusals(refusals);
+            tell_refusals(refusals);
+        }
         if (!moved || !can_->commanded()) continue;
         if (!std::exchange(started, true))
             for (const auto& sensor : sensors_.all) sensor->start_at(can_->first_ns());

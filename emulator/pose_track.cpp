@@ -1,8 +1,10 @@
 #include "emulator/pose_track.h"
 
 #include <cassert>
+#include <cmath>
 #include <cstring>
 
+#include "base/constants.h"
 #include "base/time.h"
 
 namespace narpa {
@@ -13,6 +15,17 @@ constexpr std::int64_t kHistory_ns = kSecond_ns;  // sensors look back by an exp
 
 bool at_rest(const Motion& m) {
     return m.velocity_m_s == Vec3{};
+}
+
+/// Rotation from `a` to `b` within `h` seconds, in the frame of `a`: by the shortest arc, or, where the commanded
+/// rates are of more than half a turn, with the number of whole turns that comes closest to them.
+Vec3 rotation_between(const Motion& a, const Motion& b, double h) {
+    const Vec3 shortest = rotation_vector(conjugate(a.T_world_body.q) * b.T_world_body.q);
+    const Vec3 commanded = (0.5 * h) * (a.rate_rad_s + b.rate_rad_s);
+    if (!(norm(commanded) > kPi)) return shortest;
+    const double angle = norm(shortest);
+    const Vec3 axis = angle > 1e-9 ? shortest / angle : commanded / norm(commanded);
+    return shortest + (2 * kPi * std::round((dot(commanded, axis) - angle) / (2 * kPi))) * axis;
 }
 
 }  // namespace
@@ -88,8 +101,9 @@ Motion PoseTrack::interpolate(const Sample& a, const Sample& b, std::int64_t t_n
             Ta.t + (u2 * (3 - 2 * u)) * chord + (h * u * (1 - u) * (1 - u)) * va - (h * u2 * (1 - u)) * vb;
         m.velocity_m_s = (6 * u * (1 - u) / h) * chord + ((1 - u) * (1 - 3 * u)) * va + (u * (3 * u - 2)) * vb;
     }
-    m.T_world_body.q = slerp(Ta.q, Tb.q, u);
-    m.rate_rad_s = rotation_vector(conjugate(Ta.q) * Tb.q) / h;
+    const Vec3 rotation = rotation_between(a.motion, b.motion, h);
+    m.T_world_body.q = norm(rotation) > kPi ? normalized(Ta.q * exp_rotation(u * rotation)) : slerp(Ta.q, Tb.q, u);
+    m.rate_rad_s = rotation / h;
     return m;
 }
 

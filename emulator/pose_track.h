@@ -1,9 +1,10 @@
 /// emulator/pose_track.h - the pose of one commanded body at any time, from its pose commands.
 ///
 /// Between two commands: cubic Hermite in position through the commanded velocities (straight when both commands
-/// carry none), shortest-arc slerp in attitude. After the newest: constant velocity and body rate for
-/// `stale_after_s`; then the body holds still and is reported as stale. One thread writes, any number read; neither
-/// side locks or allocates.
+/// carry none), slerp in attitude: by the shortest arc, or with the whole turns that the commanded rates state
+/// where these are of more than half a turn between the commands. After the newest: constant velocity and body rate
+/// for `stale_after_s`; then the body holds still and is reported as stale. One thread writes, any number read;
+/// neither side locks or allocates.
 #pragma once
 
 #include <array>

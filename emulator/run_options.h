@@ -22,7 +22,7 @@ struct RunOptions {
     int threads = 0;                   ///< tracing threads; 0: one per core, or one per entry of `cpus`
     std::vector<int> cpus;             ///< processors that tracing threads are bound to in real time; empty: any
     std::vector<OpenFrameObserver> observers{};            ///< of names that differ; several may share a camera
-    std::function<void(const std::string&)> on_refusal{};  ///< in lockstep, once, when CanNode::refuses_poses
+    std::function<void(const std::string&)> on_refusal{};  ///< once, when CanNode::refuses_poses, during the run
 };
 
 }  // namespace narpa

@@ -87,15 +87,15 @@ void CanNode::note_refusal(Listener& l, TrackStatus status) noexcept {
     if (++l.refused_in_a_row >= kManyRefused) l.many_refused = many_refused_ = true;
 }
 
-std::vector<RefusedPoses> CanNode::refused_poses() const {
-    std::vector<RefusedPoses> bodies;
+void CanNode::refusals(PoseRefusals& out) const {
+    out.too_far_ahead = counters_.too_far_ahead;
+    out.bodies.clear();
     for (const Listener& l : listeners_) {
         if (!l.many_refused) continue;
-        bodies.push_back(l.refused);
-        bodies.back().can_id = l.decoder.base_id();
-        bodies.back().newest_ns = l.track->newest_ns();
+        out.bodies.push_back(l.refused);
+        out.bodies.back().can_id = l.decoder.base_id();
+        out.bodies.back().newest_ns = l.track->newest_ns();
     }
-    return bodies;
 }
 
 DecodeStatus CanNode::take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept {

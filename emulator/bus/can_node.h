@@ -39,6 +39,13 @@ struct RefusedPoses {
     std::int64_t newest_ns = 0;  ///< time of validity of the newest one that was accepted
 };
 
+/// Why a user should hear of commands that were refused.
+struct PoseRefusals {
+    std::uint64_t too_far_ahead = 0;
+    std::vector<RefusedPoses>
+        bodies{};  ///< of which kManyRefused commands in a row were refused as past or overrun
+};
+
 /// The log has every command, every message of a closed loop and everything that narpa sends. Of other frames it
 /// has at most kOtherFramesPerSecond of the simulation clock (a full bus of 1 Mbit/s carries about 8000), and fewer
 /// where the disk is slow; the others are counted, and a line of the log states how many: protocols/can/README.md.
@@ -92,11 +99,10 @@ public:
     [[nodiscard]] std::int64_t first_ns() const noexcept;
 
     [[nodiscard]] CommandCounters counters() const noexcept;
-    /// Commands refused so far because they were too far ahead.
-    [[nodiscard]] std::uint64_t too_far_ahead() const noexcept { return counters_.too_far_ahead; }
-    /// The bodies of which kManyRefused commands in a row were refused as past or overrun.
-    [[nodiscard]] std::vector<RefusedPoses> refused_poses() const;
-    /// True if one of these two calls for a notice to the user.
+    /// The refusals so far. Allocates nothing if `out` has room for the commanded bodies.
+    void refusals(PoseRefusals& out) const;
+    [[nodiscard]] std::size_t commanded_bodies() const noexcept { return listeners_.size(); }
+    /// True if they call for a notice to the user.
     [[nodiscard]] bool refuses_poses() const noexcept { return many_refused_ || counters_.too_far_ahead > 0; }
 
 private:

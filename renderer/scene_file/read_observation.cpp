@@ -95,7 +95,7 @@ void read_observer(TableReader& root, SceneReading& reading) {
     ObserverPlace place = read_place(*table);
     stand_on_earth(*table, place);
     const bool refracted = table->boolean("refraction").value_or(true);
-    if (scene.epoch_unix_ns == 0) root.fail("observer", "the time is not known, expected an \"epoch\" in [scene]");
+    if (!reading.has_epoch) root.fail("observer", "the time is not known, expected an \"epoch\" in [scene]");
     const Observing observing{GroundObserver(place, scene.epoch_unix_ns), refracted};
     turn_earth(*table, observing.at_start, scene.bodies);
     const auto apparent = table->texts("sees");

@@ -274,6 +274,33 @@ TEST_F(BusFlood, ABodyWhoseCommandsAreAllPastIsReported) {
     }
 }
 
+TEST_F(BusFlood, InRealTimeRefusalsAreToldDuringTheRun) {
+    const std::string spec = "log:" + (folder_ / "past.log");
+    {
+        auto bus = open_can_bus(spec, CanRole::client);
+        ASSERT_TRUE(bus);
+        (*bus)->send(pose(0));
+        (*bus)->send(pose(1, 30'000'000'000));
+        for (int k = 2; k < 14; ++k) (*bus)->send(pose(k));
+    }
+    StopFlag stop{false};
+    std::vector<std::string> refusals;
+    RunOptions o;
+    o.bus = spec;
+    o.duration_s = 3600;  // the refusal ends it
+    o.video = {{"nav", "none"}};
+    o.on_refusal = [&](const std::string& what) {
+        refusals.push_back(what);
+        stop = true;
+    };
+    const auto emulator = Emulator::create(scene(small_scene()), o);
+    ASSERT_TRUE(emulator);
+    ASSERT_TRUE((*emulator)->run(stop));
+    ASSERT_EQ(refusals.size(), 1U);
+    EXPECT_NE(refusals[0].find("pose commands of \"chaser\" (can_id 0x100) refused: "), std::string::npos)
+        << refusals[0];
+}
+
 TEST_F(BusFlood, ALockstepRunMakesNoFramesForARefusedCommandAndReportsIt) {
     const std::string spec = "log:" + (folder_ / "jump.log");
     {

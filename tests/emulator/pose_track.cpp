@@ -5,6 +5,8 @@
 
 #include <thread>
 
+#include "base/constants.h"
+
 namespace narpa {
 namespace {
 
@@ -54,6 +56,31 @@ TEST(PoseTrack, FollowsConstantRatesBetweenAndBeyondCommands) {
         EXPECT_LT(norm(p.motion.velocity_m_s - truth.velocity_m_s), 1e-11) << t;
         EXPECT_LT(norm(p.motion.rate_rad_s - truth.rate_rad_s), 1e-11) << t;
         EXPECT_FALSE(p.stale);
+    }
+}
+
+TEST(PoseTrack, FollowsRatesOfManyTurnsBetweenCommands) {
+    const Vec3 axis = Vec3{2, -1, 2} / 3;
+    for (const double rate : {-40.0, -7.0, -3.2, 0.5, 3.1, 3.2, 2 * kPi, 9.0, 100.0}) {
+        Motion start{{normalized(Quat{0.9, 0.1, -0.3, 0.2}), {}}, {}, rate * axis};
+        PoseTrack track({}, 0.5);
+        ASSERT_EQ(track.push(command(0, start), 0), TrackStatus::taken);
+        ASSERT_EQ(track.push(command(kSecond, extrapolate(start, 1)), 0), TrackStatus::taken);
+        for (std::int64_t t = 0; t <= kSecond; t += 13 * kMs) {
+            const Motion truth = extrapolate(start, static_cast<double>(t) * 1e-9), m = track.at(t).motion;
+            EXPECT_LT(angle_between(m.T_world_body.q, truth.T_world_body.q), 1e-9) << rate << " rad/s, " << t;
+            EXPECT_LT(norm(m.rate_rad_s - truth.rate_rad_s), 1e-9) << rate << " rad/s, " << t;
+        }
+    }
+}
+
+TEST(PoseTrack, GoesByTheShortestArcWhereRatesAreOfLessThanHalfATurn) {
+    for (const double rate : {0.0, 1.0, -3.0}) {
+        PoseTrack track({}, 0.5);
+        const Motion start{{{}, {}}, {}, {0, 0, rate}}, end{{exp_rotation({0, 0, 3}), {}}, {}, {0, 0, rate}};
+        ASSERT_EQ(track.push(command(0, start), 0), TrackStatus::taken);
+        ASSERT_EQ(track.push(command(kSecond, end), 0), TrackStatus::taken);
+        EXPECT_NEAR(track.at(kSecond / 2).motion.rate_rad_s.z, 3, 1e-12);
     }
 }
 

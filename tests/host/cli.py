@@ -247,6 +247,16 @@ def check_silence():
            f"run tells that frames were late: {said[-300:]}")
 
 
+def check_unix_times():
+    """A trajectory that begins in days, such as one in Unix time, is refused at once, with the shift that mends it."""
+    header = "t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
+    flight = folder / "unix.csv"
+    flight.write_text(header + "".join(f"{1700000000 + 0.1 * k:.1f},chaser,0,0,0,1,0,0,0,0,0,0,0,0,0\n" for k in range(3)))
+    expect_refusal(2, r"unix\.csv:2: the first row is at 1700000000 s, .*; --start=-1700000000 shifts",
+                   "fly", flight, "--can", f"log:{folder}/unix.log", "--wait", "0")  # fmt: skip
+    narpa("fly", flight, "--can", f"log:{folder}/unix.log", "--wait", "0", "--start=-1700000000")
+
+
 def check_modes():
     """`fly` in another mode than the emulator fails at the first heartbeat and sends no command."""
     flight = folder / "modes.csv"
@@ -356,5 +366,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_modes, check_gone, check_replay, check_devices, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_unix_times, check_modes, check_gone, check_replay, check_devices, check_folders):
     check()

@@ -146,6 +146,18 @@ TEST(GroundScene, PointsTheTelescopeAtTheApparentStation) {
     EXPECT_NEAR((norm(k) - 1) * 6.37e6, 47, 0.5);
 }
 
+TEST(GroundScene, TheFirstSecondOf1970IsATimeLikeAnyOther) {
+    const MemoryFolder folder;
+    for (const char* epoch : {"1970-01-01T00:00:00Z", "1970-01-01T01:00:00+01:00", "1969-12-31T23:59:59Z"}) {
+        std::string text = kGroundScene;
+        text.replace(text.find("2026-03-01T07:20:00Z"), 20, epoch);
+        const auto scene = read_scene(folder.write("s.toml", text));
+        ASSERT_TRUE(scene) << epoch << ": " << scene.error().text();
+        const GroundObserver observer(kGreenwich, scene->epoch_unix_ns);
+        EXPECT_LT(norm(scene->cameras[0].T_mount_camera.t - observer.position_m()), 1e-3) << epoch;
+    }
+}
+
 TEST(GroundScene, AnObserverOnTheEllipsoidIsAboveItsSurface) {
     const MemoryFolder folder;
     for (const double latitude_deg : {0.0, 12.3, 45.0, -67.8, 90.0}) {

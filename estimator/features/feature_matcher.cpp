@@ -98,7 +98,7 @@ std::vector<FeatureMatch> track_points(const ByteImage& view, const ByteImage& f
     return matches;
 }
 
-Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame, const FeatureMatch& match) {
+UnalignedMatrix<2, 2> flow_covariance(const ByteImage& view, const ByteImage& frame, const FeatureMatch& match) {
     const int view_u = static_cast<int>(std::lround(match.view_u)),
               view_v = static_cast<int>(std::lround(match.view_v)),
               frame_u = static_cast<int>(std::lround(match.frame_u)),

@@ -77,7 +77,7 @@ inline constexpr int kFlowHalfWindow_px = 10;
 /// Covariance (px^2; u, v) of a point tracked by optical flow into `frame`, of the noise of its pixels: G^-1 (sum
 /// of variance g g') G^-1 over the flow's window, g the gradients of the view and G the sum of g g'. Zero where G
 /// is singular: no corner.
-[[nodiscard]] Eigen::Matrix2d flow_covariance(const ByteImage& view, const ByteImage& frame,
-                                              const FeatureMatch& match);
+[[nodiscard]] UnalignedMatrix<2, 2> flow_covariance(const ByteImage& view, const ByteImage& frame,
+                                                    const FeatureMatch& match);
 
 }  // namespace narpa

@@ -13,8 +13,8 @@
 
 namespace narpa {
 
-using Vector12 = Eigen::Matrix<double, 12, 1>;
-using Matrix12 = Eigen::Matrix<double, 12, 12>;
+using Vector12 = UnalignedMatrix<12, 1>;
+using Matrix12 = UnalignedMatrix<12, 12>;
 
 /// The target relative to the chaser; origins are the centres of mass.
 struct RelativeState {

@@ -139,10 +139,10 @@ private:
     std::vector<Group> groups_;
 };
 
-using Matrix26 = Eigen::Matrix<double, 2, 6>;
+using Matrix26 = UnalignedMatrix<2, 6>;
 
-[[nodiscard]] inline Eigen::Matrix<double, 2, 3> to_eigen(const ProjectionJacobian& J) {
-    Eigen::Matrix<double, 2, 3> m;
+[[nodiscard]] inline UnalignedMatrix<2, 3> to_eigen(const ProjectionJacobian& J) {
+    UnalignedMatrix<2, 3> m;
     m << J.x.x, J.x.y, J.x.z, J.y.x, J.y.y, J.y.z;
     return m;
 }

@@ -12,8 +12,12 @@
 
 namespace narpa {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+/// In installed headers, matrices whose alignment would depend on the compiler's vector flags have none: a user may
+/// compile with other flags than narpa.
+template <int rows, int columns>
+using UnalignedMatrix = Eigen::Matrix<double, rows, columns, Eigen::DontAlign>;
+using Vector6 = UnalignedMatrix<6, 1>;
+using Matrix6 = UnalignedMatrix<6, 6>;
 
 inline Eigen::Vector3d to_eigen(const Vec3& v) {
     return {v.x, v.y, v.z};

@@ -49,7 +49,7 @@ inline constexpr std::array<ModelErrorName, 8> kModelErrors{{
 
 /// Columns: the shifts of the pose, (rotation rad, translation m) as in pose_estimate.h, by one standard deviation
 /// of each nuisance. Their covariance is the matrix times its transpose.
-using PoseShifts = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 16>;
+using PoseShifts = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::DontAlign, 6, 16>;
 
 /// Shifts by mesh_m, boresight_rad and clock_s, which act on the poses of every sensor alike. `motion`: the
 /// target's, in sensor axes.

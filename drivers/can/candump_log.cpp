@@ -6,8 +6,10 @@
 #include <cstring>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "base/text_lines.h"
 #include "drivers/can/buses.h"
 #include "drivers/descriptor.h"
 #include "protocols/can/candump.h"
@@ -93,14 +95,15 @@ CanBusResult open_reader(const std::string& path) {
     std::ifstream file(path);
     if (!file) return cannot("open", path, errno);
     std::vector<ReceivedFrame> frames;
-    std::string text;
+    TextLines lines(file);
+    std::string_view text;
     std::int64_t t_first_ns = 0;
     std::uint64_t error_frames = 0;
     bool any = false;
-    for (int number = 1; std::getline(file, text); ++number) {
-        if (text.find_first_not_of(" \t\r") == std::string::npos) continue;
+    while (lines.next(text)) {
+        if (text.find_first_not_of(" \t") == std::string_view::npos) continue;
         CandumpLine line;
-        if (const char* expected = parse_candump(text, line)) return Error{expected, path, number};
+        if (const char* expected = parse_candump(text, line)) return Error{expected, path, lines.number()};
         if (!any) t_first_ns = line.t_ns;
         any = true;
         if (line.frame.error)

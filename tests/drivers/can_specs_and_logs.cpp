@@ -92,6 +92,24 @@ TEST_F(CanLog, BadLineIsNamed) {
     EXPECT_EQ(error_of("log:/no/such/file.log", CanRole::client).kind, ErrorKind::bad_input);
 }
 
+TEST_F(CanLog, ByteOrderMarkAndLineEndsOfOtherSystemsAreRead) {
+    std::string utf16("\xff\xfe", 2);
+    for (const char c : std::string("(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n")) utf16 += c, utf16 += '\0';
+    for (const std::string& text :
+         {std::string("\xef\xbb\xbf(1.0) vcan0 123#00\n(2.0) vcan0 123#01\n"),
+          std::string("\xef\xbb\xbf(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n"),
+          std::string("(1.0) vcan0 123#00\r(2.0) vcan0 123#01\r"), utf16}) {
+        auto bus = open_or_fail(write(text), CanRole::hub);
+        ASSERT_TRUE(bus);
+        ReceivedFrame out;
+        ASSERT_TRUE(bus->receive(out));
+        ASSERT_TRUE(bus->receive(out));
+        EXPECT_TRUE(same(out.frame, can_frame(0x123, {1})));
+        EXPECT_TRUE(bus->ended());
+    }
+    EXPECT_EQ(error_of(write("\xef\xbb\xbf(1.0) vcan0 123#00\r(2.0) vcan0 123#0\r")).line, 2);
+}
+
 TEST_F(CanLog, EmptyLogHasEndedAtOnce) {
     auto bus = open_or_fail(write(""), CanRole::hub);
     ASSERT_TRUE(bus);

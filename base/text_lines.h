@@ -92,6 +92,8 @@ public:
         return true;
     }
     [[nodiscard]] int number() const { return number_; }  ///< of the line, from 1
+    /// The line is the last one and has no line end: it may have been cut off.
+    [[nodiscard]] bool may_be_cut() const { return at_ > text_.size(); }
 
 private:
     std::string text_;

@@ -115,7 +115,7 @@ PoseResult by_ceres(const PnpTrial& trial, std::span<const Rigid3> starts) {
     for (const Rigid3& start : starts) {
         const Residuals residuals{trial, normalized(start.q)};
         ceres::TinySolver<Residuals> solver;
-        Vector6 x;
+        Eigen::Matrix<double, 6, 1> x;
         x << 0, 0, 0, to_eigen(start.t);
         const double cost = solver.Solve(residuals, &x).final_cost;
         const Rigid3 T = residuals.pose(x.data());

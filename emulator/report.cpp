@@ -21,6 +21,7 @@ json bus_document(const CanNode& node) {
             {"send_drops", b.send_drops},
             {"receive_overflow", b.receive_overflow},
             {"malformed", b.malformed},
+            {"not_carried", b.not_carried},
             {"error_frames", b.error_frames},
             {"bus_off", b.bus_off},
             {"interface_down", b.interface_down},
@@ -43,6 +44,7 @@ std::string bus_text(const CanNode& node) {
                                  : fmt::format(", {} not (no client, full queue or interface down)", b.send_drops),
                non_zero({{"receive overflow", b.receive_overflow},
                          {"malformed", b.malformed},
+                         {"CAN FD over slcan or CAN XL, which are not carried", b.not_carried},
                          {"error frames", b.error_frames},
                          {"bus-off", b.bus_off},
                          {"connection or interface lost", b.interface_down}})) +

@@ -24,6 +24,7 @@ struct CanCounters {
     std::uint64_t send_drops = 0;        ///< queue full, no client, interface down, FD on a classic bus
     std::uint64_t receive_overflow = 0;  ///< frames that the kernel or a full buffer dropped before they were read
     std::uint64_t malformed = 0;         ///< lines or datagrams that are not a CAN frame
+    std::uint64_t not_carried = 0;       ///< frames of kinds that the bus does not carry: CAN FD over slcan, CAN XL
     std::uint64_t error_frames = 0;      ///< controller error reports
     std::uint64_t bus_off = 0;           ///< times that the controller went bus-off
     std::uint64_t interface_down = 0;    ///< times that the interface or the connection went away

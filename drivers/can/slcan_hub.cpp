@@ -26,7 +26,8 @@ constexpr std::size_t kTcpClients = 8, kPty = kTcpClients, kClients = kTcpClient
 
 struct Client {
     SlcanStream stream{};
-    bool open = false;             ///< it has sent O: it is on the bus
+    bool open = false;             ///< it has sent O or L: it is on the bus
+    bool listens_only = false;     ///< it has sent L: it sends no frames
     std::uint64_t connection = 0;  ///< serial number of the connection
     bool commands = false;         ///< it has sent a command
     std::uint64_t overlong = 0;
@@ -171,7 +172,7 @@ private:
             for (std::size_t i = 0; i < kTcpClients; ++i) {
                 if (clients_[i].stream) continue;
                 clients_[i].stream.attach(std::move(fd));
-                clients_[i].open = clients_[i].commands = false;
+                clients_[i].open = clients_[i].commands = clients_[i].listens_only = false;
                 clients_[i].connection = ++connections_;
                 clients_[i].overlong = 0;
                 break;
@@ -194,13 +195,15 @@ private:
         const bool bare = line.size() == 1;
         switch (line[0]) {
             case 'O':
+            case 'L':
             case 'C':
                 if (!bare) return refuse(client);
-                client.open = line[0] == 'O';
+                client.open = line[0] != 'C', client.listens_only = line[0] == 'L';
                 if (!client.open) client.commands = false;
                 if (&client == &clients_[kPty] && !client.open) discard_unread(client);
                 return answer(client, "\r");
             case 'S':
+            case 'Y':
                 return line.size() == 2 && line[1] >= '0' && line[1] <= '9' ? answer(client, "\r") : refuse(client);
             case 'V': return bare ? answer(client, "V1013\r") : refuse(client);
             case 'N': return bare ? answer(client, "NNRP1\r") : refuse(client);
@@ -211,7 +214,11 @@ private:
 
     void take_frame(Client& client, std::string_view line) noexcept {
         ReceivedFrame received;
-        if (!client.open || !decode_slcan(line, received.frame)) return refuse(client);
+        if (is_slcan_fd(line)) {
+            ++counters_.not_carried;
+            return answer(client, "\a");
+        }
+        if (!client.open || client.listens_only || !decode_slcan(line, received.frame)) return refuse(client);
         received.t_received_ns = monotonic_ns();
         queue_.push({received, static_cast<std::size_t>(&client - clients_.data()), client.connection});
         answer(client, received.frame.extended ? "Z\r" : "z\r");

@@ -18,10 +18,10 @@ bool is_unit(const Quat& q) {
 }
 
 template <int N>
-bool is_covariance(const Eigen::Matrix<double, N, N>& C) {
+bool is_covariance(const UnalignedMatrix<N, N>& C) {
     if (!C.allFinite()) return false;
     if ((C - C.transpose()).cwiseAbs().maxCoeff() > 1e-9 * C.cwiseAbs().maxCoeff()) return false;
-    return normalised_error_squared(Eigen::Matrix<double, N, 1>::Zero(), C) == 0;
+    return normalised_error_squared(UnalignedMatrix<N, 1>::Zero(), C) == 0;
 }
 
 /// Text on what is wrong with a measurement; null: nothing.
@@ -118,7 +118,7 @@ std::pair<double, Eigen::Matrix<double, 1, 12>> expected_range(const RelativeSta
     return {range_m, H};
 }
 
-using Matrix1 = Eigen::Matrix<double, 1, 1>;
+using Matrix1 = UnalignedMatrix<1, 1>;
 
 /// A root W of the inverse: A^-1 = W' W.
 Matrix6 root_of_inverse(const Matrix6& A) {
@@ -133,14 +133,14 @@ template <int N>
 struct Innovation {
     Eigen::Matrix<double, N, 12> H;
     Eigen::Matrix<double, N, 1> z;
-    Eigen::Matrix<double, N, N> R;                   ///< of the measurement
-    Eigen::Matrix<double, 12, N> PH{};               ///< P H'
-    Eigen::Matrix<double, N, N> root_information{};  ///< of the innovation
+    UnalignedMatrix<N, N> R;                   ///< of the measurement
+    Eigen::Matrix<double, 12, N> PH{};         ///< P H'
+    UnalignedMatrix<N, N> root_information{};  ///< of the innovation
     double nis = 0;
 
     void form(const Matrix12& P) {
         PH = P * H.transpose();
-        const Eigen::Matrix<double, N, N> covariance = H * PH + R;
+        const UnalignedMatrix<N, N> covariance = H * PH + R;
         root_information = root_of_inverse(covariance);
         nis = (root_information * z).squaredNorm();
     }

@@ -7,7 +7,7 @@
 namespace narpa {
 
 SymmetricEigen symmetric_eigen(const Matrix6& A) {
-    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(A);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(A);
     return {eigen.eigenvalues(), eigen.eigenvectors()};
 }
 

@@ -36,6 +36,26 @@ bool get_stamp(std::string_view text, std::int64_t& t_ns) {
     return true;
 }
 
+/// Removes the length code of eight bytes, "_9" to "_F", from the end of a classic frame: 16 digits, or R8.
+bool take_length_code(std::string_view& text) {
+    const std::size_t at = text.rfind('_');
+    if (at == text.npos) return true;
+    std::uint32_t code = 0;
+    if (at + 2 != text.size() || !get_hex(text.substr(at + 1), code) || code < 9) return false;
+    text.remove_suffix(2);
+    const auto digits = std::ranges::count_if(text, [](char c) { return c != '.'; });
+    return digits == 16 || (digits == 2 && text[1] == '8');
+}
+
+/// VCID and priority, flags : type : acceptance field, data. Only its form is checked.
+bool is_can_xl(std::string_view frame, std::size_t hash) {
+    std::uint32_t number = 0;
+    const std::string_view head = frame.substr(hash + 1);
+    return hash == 5 && get_hex(frame.substr(0, 5), number) && head.size() > 14 && head[2] == ':' &&
+           head[5] == ':' && head[14] == '#' && get_hex(head.substr(0, 2), number) &&
+           get_hex(head.substr(3, 2), number) && get_hex(head.substr(6, 8), number);
+}
+
 /// What follows the first '#'.
 const char* get_content(std::string_view text, CanFrame& frame) {
     if (!text.empty() && text[0] == '#') {
@@ -45,6 +65,8 @@ const char* get_content(std::string_view text, CanFrame& frame) {
         frame.fd = true;
         frame.bit_rate_switch = (flags & 1) != 0;
         text.remove_prefix(2);
+    } else if (!take_length_code(text)) {
+        return "expected a length code of _9 to _F after eight bytes";
     } else if (!text.empty() && (text[0] == 'R' || text[0] == 'r')) {
         frame.remote = true;
         if (text.size() == 1) return nullptr;
@@ -84,12 +106,18 @@ CanFrame lost_frames(std::uint32_t count) noexcept {
 const char* parse_candump(std::string_view line, CandumpLine& out) noexcept {
     CandumpLine read;
     if (!get_stamp(next_word(line), read.t_ns)) return "expected a stamp such as (1700000000.250000)";
-    if (next_word(line).empty()) return "expected an interface name such as vcan0";
+    read.interface = next_word(line);
+    if (read.interface.empty()) return "expected an interface name such as vcan0";
     const std::string_view frame = next_word(line), direction = next_word(line);
     if (!next_word(line).empty() || (!direction.empty() && direction != "R" && direction != "T"))
         return "expected nothing, R or T after the frame";
     const std::size_t hash = frame.find('#');
     if (hash == std::string_view::npos) return "expected a frame such as 123#DEADBEEF";
+    if (is_can_xl(frame, hash)) {
+        read.is_xl = true;
+        out = read;
+        return nullptr;
+    }
     std::uint32_t id = 0;
     if ((hash != 3 && hash != 8) || !get_hex(frame.substr(0, hash), id))
         return "expected an identifier of 3 or 8 hex digits";
@@ -105,6 +133,20 @@ const char* parse_candump(std::string_view line, CandumpLine& out) noexcept {
     if (const char* expected = get_content(frame.substr(hash + 1), read.frame)) return expected;
     out = read;
     return nullptr;
+}
+
+std::string_view remedy_for_log(std::string_view line) noexcept {
+    constexpr std::string_view kConvert = "python-can converts it: python3 -m can.logconvert FILE OUT.log";
+    constexpr std::string_view kOthers[]{"timestamp,arbitration_id,", "LOGG", ";$FILEVERSION", "MDF     ",
+                                         "SQLite format"};
+    if (line.starts_with("date ") || line.starts_with("base "))
+        return "it is a Vector ASC log; asc2log of can-utils converts it: asc2log -I FILE -O OUT.log";
+    for (const std::string_view begin : kOthers)
+        if (line.starts_with(begin)) return kConvert;
+    const std::size_t bracket = line.find('[');
+    if (bracket != line.npos && line.find(']', bracket) != line.npos && line.find('#') == line.npos)
+        return "candump prints such lines for people; candump -l and -L write what is needed";
+    return "";
 }
 
 std::size_t format_candump(const CandumpLine& line, std::string_view interface,

@@ -2,6 +2,8 @@
 ///
 /// (1700000000.250000) vcan0 123#DEADBEEF     data        (..) vcan0 18FF50E5#R4   remote, length 4
 /// (1700000000.250000) vcan0 123##1DEADBEEF   CAN FD, the digit holds the flags (1 bit rate switch, 2 error state)
+/// (1700000000.250000) vcan0 123#1122334455667788_E    the length code of 8 bytes (9 to F), which has no effect
+/// (1700000000.250000) vcan0 45123#81:00:12345678#1122 CAN XL, which narpa does not carry
 /// A trailing " R" or " T" (direction, as python-can writes it) is allowed. Source: can-utils, lib.h and candump.c.
 #pragma once
 
@@ -17,6 +19,8 @@ namespace narpa {
 struct CandumpLine {
     std::int64_t t_ns = 0;  ///< stamp as in the line: usually Unix time
     CanFrame frame{};
+    bool is_xl = false;               ///< CAN XL: `frame` is empty
+    std::string_view interface = {};  ///< a part of the line
 };
 
 inline constexpr std::size_t kCandumpMaxLine = 224;
@@ -27,6 +31,9 @@ inline constexpr std::size_t kCandumpMaxLine = 224;
 
 /// Returns nullptr when the line (without its line end) is good, else what was expected; `out` is then unchanged.
 [[nodiscard]] const char* parse_candump(std::string_view line, CandumpLine& out) noexcept;
+
+/// If this first line is that of another kind of log, what converts it; else empty.
+[[nodiscard]] std::string_view remedy_for_log(std::string_view first_line) noexcept;
 
 /// Writes the line with its LF, microseconds as candump does and a time before 0 as 0; `interface` at most 15
 /// characters. Returns its length.

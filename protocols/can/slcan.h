@@ -2,8 +2,8 @@
 ///
 /// t iii n dd..  data frame, 11-bit id (hex)     r iii n  remote frame
 /// T iiiiiiii n dd..  the same with 29-bit id    R iiiiiiii n
-/// C close, O open, Sn bit rate, V version, N serial number, F status. Source: LAWICEL CANUSB manual, "ASCII
-/// commands".
+/// C close, O open, L open to listen only, Sn bit rate, Yn data bit rate of CAN FD, V version, N serial number, F
+/// status. Source: LAWICEL CANUSB manual, "ASCII commands".
 #pragma once
 
 #include <array>
@@ -25,6 +25,11 @@ inline constexpr std::size_t kSlcanMaxLine = 27;
 /// One line without its CR. A time stamp of four digits after the data is allowed and ignored (LAWICEL Z1).
 [[nodiscard]] bool decode_slcan(std::string_view line, CanFrame& out) noexcept;
 
+/// A CAN FD frame as CANable 2 writes it (d, D without, b, B with bit rate switch): slcan here carries none.
+[[nodiscard]] inline bool is_slcan_fd(std::string_view line) noexcept {
+    return !line.empty() && std::string_view("dDbB").find(line[0]) != std::string_view::npos;
+}
+
 /// Cuts a stream of bytes into lines. Lines longer than any valid one are dropped and counted.
 class SlcanLines {
 public:
@@ -36,7 +41,7 @@ public:
     [[nodiscard]] std::uint64_t overlong() const noexcept { return overlong_; }
 
 private:
-    std::array<char, 64> buffer_{};
+    std::array<char, 160> buffer_{};  // a CAN FD frame has up to 138
     std::size_t size_ = 0;
     bool done_ = false, skipping_ = false;
     std::uint64_t overlong_ = 0;

@@ -55,6 +55,10 @@ Status check_y4m_stream_header(std::string_view line, const VideoFormat& format)
     const Result<std::string> own = y4m_stream_header(format);
     if (!own) return own.error();
     if (!line.starts_with(magic)) return Error{"not a Y4M stream: it does not begin with YUV4MPEG2"};
+    if (line.ends_with('\r'))
+        return Error{
+            "its first line ends in a carriage return: the stream was written or copied as text, expected "
+            "it as binary"};
     const std::string_view tags = line.substr(magic.size());
     const std::string_view colour = tag_value(tags, 'C');  // none means 420: yuv4mpeg(5)
     const std::string found =
@@ -62,6 +66,8 @@ Status check_y4m_stream_header(std::string_view line, const VideoFormat& format)
     const std::string expected =
         size_text(std::to_string(format.width), std::to_string(format.height), row_of(format.pixel).y4m);
     if (found != expected) return Error{"the stream has " + found + " frames, expected " + expected};
+    if (const std::string_view order = tag_value(tags, 'I'); !order.empty() && order != "p" && order != "?")
+        return Error{"the stream is interlaced (I" + std::string(order) + "), expected progressive frames"};
     return Ok{};
 }
 

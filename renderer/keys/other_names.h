@@ -19,4 +19,7 @@ struct OtherName {
 /// else the one with nearly this spelling, else one that only ends in another unit.
 [[nodiscard]] std::string key_meant(std::string_view unknown, const std::vector<std::string>& known);
 
+/// The same for the words that a key takes: V4L2's and ROS's names of pixel formats, else the nearest spelling.
+[[nodiscard]] std::string word_meant(std::string_view unknown, const std::vector<std::string_view>& words);
+
 }  // namespace narpa

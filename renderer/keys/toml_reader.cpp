@@ -391,7 +391,8 @@ std::optional<std::size_t> TableReader::word(std::string_view key, const std::ve
     if (!given) return std::nullopt;
     if (const auto at = std::ranges::find(words, *given); at != words.end())
         return static_cast<std::size_t>(at - words.begin());
-    fail(key, fmt::format("\"{}\" is not known here, expected one of \"{}\"", *given, fmt::join(words, "\", \"")));
+    fail(key, fmt::format("\"{}\" is not known here, expected one of \"{}\"{}", *given, fmt::join(words, "\", \""),
+                          word_meant(*given, words)));
     return std::nullopt;
 }
 

@@ -107,6 +107,27 @@ TEST_F(SlcanHub, AnswersAsLawicelDoes) {
     EXPECT_EQ(hub_->counters().malformed, 4u);
 }
 
+TEST_F(SlcanHub, AListenerHearsAndSendsNothing) {
+    Wire w(port_);
+    w.say("S6\rY5\rL\r");
+    EXPECT_EQ(w.hear(*hub_, "\r\r\r"), "\r\r\r");
+    EXPECT_TRUE(hub_->send(can_frame(0x123, {0xAA})));
+    EXPECT_EQ(w.hear(*hub_, "\r"), "t1231AA\r");
+    w.say("t1232AABB\r");
+    EXPECT_EQ(w.hear(*hub_, "\a"), "\a");
+    EXPECT_TRUE(w.frames.empty());
+    w.say("O\rt1232AABB\r");
+    EXPECT_EQ(w.hear(*hub_, "z\r"), "\rz\r");
+}
+
+TEST_F(SlcanHub, CanFdIsRefusedAndCounted) {
+    Wire w(port_);
+    w.say("O\rd10F8" + std::string(16, '0') + "\rB0000010FF" + std::string(128, '0') + "\r");
+    EXPECT_EQ(w.hear(*hub_, "\r\a\a"), "\r\a\a");
+    EXPECT_EQ(hub_->counters().not_carried, 2u);
+    EXPECT_EQ(hub_->counters().malformed, 0u);
+}
+
 TEST_F(SlcanHub, PythonCansOpeningSequence) {
     Wire w(port_);
     w.say("C\rS6\rO\rO\r");

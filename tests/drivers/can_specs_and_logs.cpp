@@ -4,12 +4,16 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include <array>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <random>
 
 #include "drivers/descriptor.h"
 #include "protocols/can/udp_multicast.h"
 #include "tests/drivers/can_support.h"
+#include "tests/support/campaign.h"
 
 namespace narpa {
 namespace {
@@ -95,10 +99,9 @@ TEST_F(CanLog, BadLineIsNamed) {
 TEST_F(CanLog, ByteOrderMarkAndLineEndsOfOtherSystemsAreRead) {
     std::string utf16("\xff\xfe", 2);
     for (const char c : std::string("(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n")) utf16 += c, utf16 += '\0';
-    for (const std::string& text :
-         {std::string("\xef\xbb\xbf(1.0) vcan0 123#00\n(2.0) vcan0 123#01\n"),
-          std::string("\xef\xbb\xbf(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n"),
-          std::string("(1.0) vcan0 123#00\r(2.0) vcan0 123#01\r"), utf16}) {
+    for (const std::string& text : {std::string("\xef\xbb\xbf(1.0) vcan0 123#00\n(2.0) vcan0 123#01\n"),
+                                    std::string("\xef\xbb\xbf(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n"),
+                                    std::string("(1.0) vcan0 123#00\r(2.0) vcan0 123#01\r"), utf16}) {
         auto bus = open_or_fail(write(text), CanRole::hub);
         ASSERT_TRUE(bus);
         ReceivedFrame out;
@@ -108,6 +111,115 @@ TEST_F(CanLog, ByteOrderMarkAndLineEndsOfOtherSystemsAreRead) {
         EXPECT_TRUE(bus->ended());
     }
     EXPECT_EQ(error_of(write("\xef\xbb\xbf(1.0) vcan0 123#00\r(2.0) vcan0 123#0\r")).line, 2);
+}
+
+TEST_F(CanLog, AnInterfaceIsChosenWhereThereAreSeveral) {
+    const std::string text =
+        "(1.0) can0 100#01\n(1.1) can1 100#02\n(1.2) can0 45123#81:00:12345678#1122\n(1.3) can0 100#03\n";
+    const Error e = error_of(write(text));
+    EXPECT_EQ(e.text(), path_ + ":2: frames of can1 after those of can0, expected those of one bus: log:" + path_ +
+                            ":can0 or log:" + path_ + ":can1");
+    auto bus = open_or_fail(write(text) + ":can0", CanRole::hub);
+    ASSERT_TRUE(bus);
+    EXPECT_EQ(bus->description(), "log: " + path_ + " (2 frames of can0)");
+    EXPECT_EQ(bus->counters().not_carried, 1u);
+    ReceivedFrame out;
+    ASSERT_TRUE(bus->receive(out) && bus->receive(out));
+    EXPECT_TRUE(same(out.frame, can_frame(0x100, {3})));
+    EXPECT_EQ(error_of(write(text) + ":can2").text(), path_ + ": it has no frame of can2, but of can0");
+}
+
+TEST_F(CanLog, ALastLineThatIsCutOffIsLeftOut) {
+    auto bus = open_or_fail(write("(1.0) can0 100#01\n(1.1) can0 100#02\n(1.2) can0 100#0"), CanRole::hub);
+    ASSERT_TRUE(bus);
+    EXPECT_EQ(bus->description(), "log: " + path_ + " (2 frames; its last line is cut off and left out)");
+    EXPECT_EQ(bus->counters().malformed, 1u);
+    EXPECT_EQ(error_of(write("(1.0) can0 100#01\n(1.1) can0 100#0\n")).line, 2);
+}
+
+TEST_F(CanLog, LogsOfOtherProgramsAreNamed) {
+    const std::pair<const char*, const char*> logs[]{
+        {"date Sat Nov 28 01:02:39.451 PM 2026\nbase hex  timestamps absolute\n", "asc2log -I FILE -O OUT.log"},
+        {"timestamp,arbitration_id,extended,remote,error,dlc,data\n1.0,0x100,0,0,0,1,AQ==\n", "can.logconvert"},
+        {";$FILEVERSION=1.1\n", "can.logconvert"},
+        {"LOGG\1\2\3", "can.logconvert"},
+        {"  vcan0  100   [8]  00 00 00 00 00 00 00 23\n", "candump -l and -L write what is needed"},
+        {" (1700000000.000000)  vcan0  100   [2]  00 23\n", "candump -l and -L write what is needed"},
+        {"not a log\n", "expected a stamp"}};
+    for (const auto& [text, what] : logs)
+        EXPECT_NE(error_of(write(text)).what.find(what), std::string::npos) << text;
+}
+
+/// A random log, and what follows from its lines.
+class RandomLog {
+public:
+    explicit RandomLog(unsigned seed) : random_(seed) {
+        chosen = whole(0, 1) == 0;
+        const char* const line_end = std::array{"\n", "\r\n", "\r"}[index(2)];
+        if (whole(0, 3) == 0) text = "\xEF\xBB\xBF";
+        const int lines = whole(1, 30);
+        for (int i = 0; i < lines; ++i) {
+            const bool mine = i == 0 || !chosen || whole(0, 2) != 0;
+            text += "(" + std::to_string(100 + i) + ".5) " + (mine ? "can0 " : "can1 ") + line(mine) +
+                    std::array{"", " R", " T"}[index(2)] + (i + 1 < lines || whole(0, 1) != 0 ? line_end : "");
+        }
+    }
+    std::string text;
+    bool chosen = false;  ///< only the lines of can0 count
+    std::vector<CanFrame> frames;
+    std::uint64_t errors = 0, not_carried = 0;
+
+private:
+    int whole(int low, int high) { return std::uniform_int_distribution(low, high)(random_); }
+    std::size_t index(int last) { return static_cast<std::size_t>(whole(0, last)); }
+
+    std::string line(bool mine) {
+        const int form = whole(0, 6);
+        if (form == 2) return errors += mine, "20000040#0000000000000000";
+        if (form == 3) return not_carried += mine, "45123#81:00:12345678#11223344";
+        const bool extended = whole(0, 1) != 0;
+        const auto id = static_cast<std::uint32_t>(whole(0, extended ? 0x1FFFFFFF : 0x7FF));
+        std::array<char, 16> name{};
+        std::snprintf(name.data(), name.size(), extended ? "%08X" : "%03X", id);
+        std::vector<std::uint8_t> data;
+        std::string hex;
+        for (int n = whole(0, 8); n > 0; --n) {
+            data.push_back(static_cast<std::uint8_t>(whole(0, 255)));
+            std::array<char, 4> digits{};
+            std::snprintf(digits.data(), digits.size(), whole(0, 1) != 0 ? "%02X" : "%02x", data.back());
+            hex += (!hex.empty() && whole(0, 9) == 0 ? "." : "") + std::string(digits.data());
+        }
+        CanFrame frame = can_frame(id, data, extended);
+        std::string content = "#" + hex + (data.size() == 8 && whole(0, 1) != 0 ? "_E" : "");
+        if (form == 0) {
+            const auto size = static_cast<std::uint8_t>(data.size());
+            frame = remote_frame(id, size, extended);
+            content = "#R" + std::to_string(size) + (size == 8 && whole(0, 1) != 0 ? "_C" : "");
+        } else if (form == 1) {
+            frame = fd_frame(id, data, true);
+            frame.extended = extended;
+            content = std::string("##") + (whole(0, 1) != 0 ? "1" : "5") + hex;
+        }
+        if (mine) frames.push_back(frame);
+        return name.data() + content;
+    }
+    std::mt19937_64 random_;
+};
+
+TEST_F(CanLog, FramesFollowFromRandomLines) {
+    for (unsigned seed = 0; seed < static_cast<unsigned>(test::trials(200, 10'000)) && !HasFailure(); ++seed) {
+        const RandomLog log(seed);
+        auto bus = open_or_fail(write(log.text) + (log.chosen ? ":can0" : ""), CanRole::hub);
+        ASSERT_TRUE(bus) << log.text;
+        EXPECT_EQ(bus->counters().error_frames, log.errors) << log.text;
+        EXPECT_EQ(bus->counters().not_carried, log.not_carried) << log.text;
+        ReceivedFrame out;
+        for (const CanFrame& f : log.frames) {
+            ASSERT_TRUE(bus->receive(out)) << log.text;
+            EXPECT_TRUE(same(out.frame, f)) << std::hex << f.id << "\n" << log.text;
+        }
+        EXPECT_FALSE(bus->receive(out)) << log.text;
+    }
 }
 
 TEST_F(CanLog, EmptyLogHasEndedAtOnce) {

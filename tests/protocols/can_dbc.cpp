@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "protocols/can/candump.h"
@@ -40,6 +41,47 @@ TEST(CanDbc, NamesBecomeSymbols) {
     EXPECT_NE(text.find("BO_ 32 _7_of_9_Time: 8 Commander\n"), std::string::npos);
     EXPECT_NE(text.find("BO_ 63 port_side_Pose: 64 Commander\n"), std::string::npos);
     EXPECT_NE(text.find("BO_ 1567 Camera1_Ledger: 64 narpa\n"), std::string::npos);
+}
+
+/// Names of messages, and of SystemMessageLongSymbol where they have it.
+std::map<std::string, std::string> names_in(const std::string& dbc) {
+    std::map<std::string, std::string> by_id, names;
+    std::istringstream lines(dbc);
+    for (std::string line, word, id, name; std::getline(lines, line);) {
+        std::istringstream words(line);
+        words >> word >> id >> name;
+        if (word == "BO_") {
+            EXPECT_TRUE(names.emplace(by_id[id] = name.substr(0, name.size() - 1), "").second) << line;
+        }
+        if (word == "BA_" && id == "\"SystemMessageLongSymbol\"") {
+            std::string of, symbol;
+            words >> of >> symbol;
+            EXPECT_EQ(name, "BO_") << line;
+            names[by_id[of]] = symbol.substr(1, symbol.size() - 3);
+        }
+    }
+    return names;
+}
+
+TEST(CanDbc, NamesDifferAndHaveAtMost32Characters) {
+    const std::string longest(60, 'a');
+    const std::vector<CanBody> bodies{{"pod-1", 0x20},   {"pod.1", 0x40},       {"pod_1", 0x60},
+                                      {longest, 0x80},   {longest + "b", 0xa0}, {"1st", 0xc0},
+                                      {"Camera0", 0xe0}, {"pod_1_2", 0x100},    {"Satellite \"x\"", 0x120}};
+    const std::string text = write_dbc(bodies, 2);
+    const auto names = names_in(text);
+    std::set<std::string> longs;
+    for (const auto& [name, symbol] : names) {
+        EXPECT_LE(name.size(), 32u) << name;
+        EXPECT_TRUE(symbol.empty() || symbol.size() > name.size()) << symbol;
+        if (!symbol.empty()) {
+            EXPECT_TRUE(longs.insert(symbol).second) << symbol;
+        }
+    }
+    EXPECT_TRUE(names.contains("pod_1_Time") && names.contains("pod_1_3_Time") && names.contains("pod_1_4_Time"));
+    EXPECT_NE(text.find("BO_ 96 pod_1_Time:"), std::string::npos) << "a name that needs no change keeps it";
+    EXPECT_TRUE(longs.contains(longest + "_Time") && longs.contains(longest + "b_Time"));
+    EXPECT_NE(text.find(" Body: pod-1.\";"), std::string::npos);
 }
 
 /// Runs can_dbc_reader.py with Debian's python; exit 77 means that canmatrix is not there.

@@ -254,7 +254,18 @@ TEST(CanCandump, ReadsWhatOthersWrite) {
     ASSERT_EQ(parse_candump("(7) can0 001#r8 T", line), nullptr);
     EXPECT_TRUE(line.frame.remote);
     EXPECT_EQ(line.frame.size, 8);
+    ASSERT_EQ(parse_candump("(7) can0 001#r8_F", line), nullptr) << "a length code";
+    EXPECT_EQ(line.frame.size, 8);
+    ASSERT_EQ(parse_candump("(7) can0 001#1122334455667788_9", line), nullptr) << "a length code";
+    EXPECT_EQ(line.frame.size, 8);
+    EXPECT_EQ(line.interface, "can0");
+    for (const char* wrong : {"(7) can0 001#1122_9", "(7) can0 001#R4_9", "(7) can0 001#1122334455667788_8",
+                              "(7) can0 001#1122334455667788_99", "(7) can0 45123#81:00:1234567#11"})
+        EXPECT_NE(parse_candump(wrong, line), nullptr) << wrong;
+    ASSERT_EQ(parse_candump("(7) can0 45123#81:00:12345678#11223344", line), nullptr) << "CAN XL";
+    EXPECT_TRUE(line.is_xl);
     ASSERT_EQ(parse_candump("(7) can0 001#11.22.33", line), nullptr) << "cansend's dots";
+    EXPECT_FALSE(line.is_xl);
     EXPECT_EQ(line.frame.data[2], 0x33);
     ASSERT_EQ(parse_candump("(7) can0 20000040#0000000000000000", line), nullptr) << "error report";
     EXPECT_TRUE(line.frame.error);

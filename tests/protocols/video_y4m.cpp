@@ -38,6 +38,19 @@ TEST(Y4m, YuyvBecomesThreePlanes) {
     EXPECT_EQ(samples, (std::vector<std::uint8_t>{'a', 'b', 'c', 'd', 'U', 'u', 'V', 'v'}));
 }
 
+TEST(Y4m, HeadersThatStateOtherFramesAreNamed) {
+    const VideoFormat format{8, 2, PixelFormat::grey, 40'000'000};
+    EXPECT_TRUE(check_y4m_stream_header("YUV4MPEG2 W8 H2 F25:1 Ip A1:1 Cmono", format));
+    EXPECT_TRUE(check_y4m_stream_header("YUV4MPEG2 W8 H2 F25:1 Cmono XCOLORRANGE=FULL", format));
+    const auto error_of = [&](const char* line) {
+        const Status good = check_y4m_stream_header(line, format);
+        return good ? "" : good.error().what;
+    };
+    EXPECT_NE(error_of("YUV4MPEG2 W8 H2 F25:1 Ip A1:1 Cmono\r").find("ends in a carriage return"),
+              std::string::npos);
+    EXPECT_NE(error_of("YUV4MPEG2 W8 H2 F25:1 It A1:1 Cmono").find("interlaced (It)"), std::string::npos);
+}
+
 TEST(Y4m, NoSampleIsLost) {
     std::mt19937_64 random(11);
     for (const PixelFormat pixel : {PixelFormat::grey, PixelFormat::y16, PixelFormat::yuyv}) {

@@ -84,7 +84,8 @@ TEST(PhotometricFit, EliminatesTheExposureAsTheWholeInverseDoes) {
     // A known exposure gives more information on the pose.
     const auto known = equations(model.images({0, 0}), {}, {});
     const Matrix6 gained = known.pose_information() - eq.pose_information();
-    EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6>(gained).eigenvalues()[0], -1e-9 * gained.norm());
+    EXPECT_GE((Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(gained).eigenvalues()[0]),
+              -1e-9 * gained.norm());
     EXPECT_GT(gained.norm(), 0);
 }
 

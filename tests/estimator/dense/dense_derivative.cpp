@@ -199,7 +199,7 @@ TEST(ImageDerivative, OfAFaceSeenNearlyEdgeOn) {
         Vector6 unit;
         unit << 1, 1, 1, 10, 10, 10;
         const Matrix6 scaled = unit.asDiagonal() * information * unit.asDiagonal();
-        const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(scaled);
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(scaled);
         const Vector6 held_min = unit.asDiagonal() * eigen.eigenvectors().col(0);
         EXPECT_NEAR(rms_change(J_at(pose, 4), held_min) / rms_change(fine, held_min), 1, 0.15) << turn;
         Renders r;

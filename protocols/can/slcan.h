@@ -40,8 +40,10 @@ public:
     /// Lines dropped because they were too long.
     [[nodiscard]] std::uint64_t overlong() const noexcept { return overlong_; }
 
+    static constexpr std::size_t kLongest = 160;  ///< a CAN FD frame has up to 138
+
 private:
-    std::array<char, 160> buffer_{};  // a CAN FD frame has up to 138
+    std::array<char, kLongest> buffer_{};
     std::size_t size_ = 0;
     bool done_ = false, skipping_ = false;
     std::uint64_t overlong_ = 0;

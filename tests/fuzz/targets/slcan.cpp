@@ -9,7 +9,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     SlcanLines lines;
     std::span<const char> rest(reinterpret_cast<const char*>(data), size);
     while (lines.next(rest)) {
-        fuzz::require(!lines.line().empty() && lines.line().size() <= 64, "a line has 1 to 64 characters");
+        fuzz::require(!lines.line().empty() && lines.line().size() <= SlcanLines::kLongest,
+                      "a line has 1 to kLongest characters");
         CanFrame frame;
         if (!fuzz::count(decode_slcan(lines.line(), frame))) continue;
         fuzz::require(fuzz::is_valid(frame) && !frame.fd, "a frame is a classic frame");

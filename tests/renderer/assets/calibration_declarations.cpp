@@ -13,6 +13,7 @@
 #include "renderer/projection/projection_kind.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/campaign.h"
+#include "tests/support/expect_has.h"
 
 namespace narpa {
 namespace {
@@ -41,8 +42,6 @@ protected:
     }
     const MemoryFolder folder;
 };
-
-#define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
 TEST_F(CalibrationDeclarations, EachKeyOfTheModelCounts) {
     const std::string four = "distortion_coefficients: [-0.02, 0.004, -0.001, 0.0002]\n";
@@ -175,9 +174,9 @@ TEST(LidarCalibrationDeclarations, CorrectionsThatAreNotUsedAreNamed) {
 }
 
 /// Random files as OpenCV and ROS lay them out; where a point appears is compared with OpenCV's projection.
-class Trial {
+class CalibrationTrial {
 public:
-    explicit Trial(unsigned seed) : random_(seed) {}
+    explicit CalibrationTrial(unsigned seed) : random_(seed) {}
 
     void run(const MemoryFolder& folder) {
         const bool fisheye = whole(0, 1) != 0;
@@ -244,7 +243,7 @@ TEST(CalibrationTrials, PointsAppearWhereOpenCvProjectsThem) {
     const MemoryFolder folder;
     for (int seed = 0; seed < test::trials(200, 10'000) && !testing::Test::HasFailure(); ++seed) {
         SCOPED_TRACE(fmt::format("seed {}", seed));
-        Trial(static_cast<unsigned>(seed)).run(folder);
+        CalibrationTrial(static_cast<unsigned>(seed)).run(folder);
     }
 }
 

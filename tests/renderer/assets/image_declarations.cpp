@@ -17,6 +17,8 @@
 #include "renderer/image/image_file.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
+#include "tests/support/campaign.h"
+#include "tests/support/expect_has.h"
 #include "tests/support/image_bytes.h"
 #include "tests/support/image_files.h"
 #include "tests/support/shapes.h"
@@ -65,8 +67,6 @@ struct Reading {
         return pixel * 3 < rgb.size() ? rgb[3 * pixel] / 65535.0 : -1;
     }
 };
-
-#define EXPECT_HAS(text, words) EXPECT_NE((text).find(words), std::string::npos) << (text)
 
 TEST(ImageDeclarations, MaxvalIsFullScale) {
     const Reading twelve(pnm("P5 3 1 4095\n", 2, {4095, 2048, 0}), Colour::linear),
@@ -405,9 +405,9 @@ TEST(ImageDeclarations, WarningsReachTheScene) {
 }
 
 /// Random declarations, and the value of each sample that follows from them.
-class Trial {
+class ImageTrial {
 public:
-    explicit Trial(unsigned seed) : random_(seed), width_(number(1, 20)), height_(number(1, 20)) {}
+    explicit ImageTrial(unsigned seed) : random_(seed), width_(number(1, 20)), height_(number(1, 20)) {}
 
     void tiff() {
         static constexpr std::array kBits{1, 2, 4, 8, 10, 12, 14, 16, 32, 32, 64};
@@ -520,9 +520,9 @@ private:
 
 TEST(ImageDeclarations, AnyDeclarationGivesItsValues) {
     const MemoryFolder folder;
-    for (unsigned seed = 0; seed < 200; ++seed) {
+    for (unsigned seed = 0; seed < static_cast<unsigned>(test::trials(200, 10'000)); ++seed) {
         SCOPED_TRACE(seed);
-        Trial trial(seed);
+        ImageTrial trial(seed);
         switch (seed % 8) {
             case 0: trial.png(); break;
             case 1: trial.exr(folder); break;

@@ -17,6 +17,7 @@
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/campaign.h"
+#include "tests/support/expect_has.h"
 
 namespace narpa {
 namespace {
@@ -103,8 +104,6 @@ Read read(const DemRequest& request) {
     auto heights = heights_of(*t);
     return {heights.contains(7) ? heights[7] : kNoHeight, joined(t->warnings)};
 }
-
-#define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
 class DemDeclarations : public testing::Test {
 protected:

@@ -204,11 +204,9 @@ void warn_of_rectification(const YAML::Node& document, std::vector<std::string>&
             "frames are as the detector sees them");
 }
 
-Calibration read_document(const std::vector<YAML::Node>& documents) {
-    const YAML::Node& document = documents.front();
+Calibration read_document(const YAML::Node& document, int documents) {
     Calibration c;
-    if (documents.size() > 1)
-        c.warnings.push_back(fmt::format("it holds {} documents; the first is used", documents.size()));
+    if (documents > 1) c.warnings.push_back(fmt::format("it holds {} documents; the first is used", documents));
     std::vector<std::string_view> known(kUsedKeys.begin(), kUsedKeys.end());
     known.insert(known.end(), kKeysOfViews.begin(), kKeysOfViews.end());
     warn_of_keys(document, known, c.warnings);

@@ -80,9 +80,7 @@ LidarBeam read_beam(const YAML::Node& laser) {
 Result<std::vector<LidarBeam>> read_lidar_calibration(const std::string& file, std::size_t beams,
                                                       std::vector<std::string>* warnings) {
     return read_yaml<std::vector<LidarBeam>>(
-        file, "a LiDAR's calibration in YAML, as ROS has it: lasers: [...]",
-        [&](const std::vector<YAML::Node>& documents) {
-            const YAML::Node& document = documents.front();
+        file, "a LiDAR's calibration in YAML, as ROS has it: lasers: [...]", [&](const YAML::Node& document, int) {
             const YAML::Node lasers = document["lasers"];
             if (!lasers || !lasers.IsSequence() || lasers.size() != beams)
                 throw YamlFault{fmt::format("expected lasers: a list of {}", beams),

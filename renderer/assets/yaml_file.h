@@ -10,6 +10,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
@@ -34,22 +35,37 @@ inline void warn_of_keys(const YAML::Node& map, std::span<const std::string_view
     }
 }
 
-/// Returns `read(documents)` for a file whose first document is a map; documents without content are left out.
+/// The number of documents with content. (YAML::LoadAll does not end on some damaged files.)
+inline int documents_in(const std::string& text) {
+    int documents = 0;
+    bool empty = true;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        if (line.starts_with("---")) empty = true;
+        const std::size_t content =
+            line.starts_with("---") ? line.find_first_not_of(" \r", 3) : line.find_first_not_of(" \r");
+        if (content == line.npos || line[content] == '#' || line[0] == '%') continue;
+        if (std::exchange(empty, false)) ++documents;
+    }
+    return documents;
+}
+
+/// Returns `read(document, documents)` for a file whose first document is a map; `documents`: how many it holds.
 /// Errors name the file and the line. `expected`: "a calibration in YAML, ...".
 template <class T, class Read>
 [[nodiscard]] Result<T> read_yaml(const std::string& file, const std::string& expected, const Read& read) {
     std::ifstream in(file, std::ios::binary);
-    std::stringstream text;
-    if (!in || !(text << in.rdbuf())) return Error{"cannot be read", file};
+    std::stringstream stream;
+    if (!in || !(stream << in.rdbuf())) return Error{"cannot be read", file};
+    const std::string text = stream.str();
     const auto at = [&](const std::string& what, const YAML::Mark& mark) {
         const bool known = !mark.is_null();
         return Error{what, file, known ? mark.line + 1 : 0, known ? mark.column + 1 : 0};
     };
     try {
-        std::vector<YAML::Node> documents = YAML::LoadAll(text);
-        std::erase_if(documents, [](const YAML::Node& node) { return !node || node.IsNull(); });
-        if (documents.empty() || !documents.front().IsMap()) return Error{"expected " + expected, file};
-        return read(documents);
+        const YAML::Node document = YAML::Load(text);
+        if (!document.IsMap()) return Error{"expected " + expected, file};
+        return read(document, documents_in(text));
     } catch (const YamlFault& fault) {
         return at(fault.what, fault.at);
     } catch (const YAML::Exception& wrong) {

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "base/file_bytes.h"
-#include "renderer/assets/text_cursor.h"
+#include "base/text_cursor.h"
 
 namespace narpa {
 

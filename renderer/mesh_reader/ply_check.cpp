@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/file_bytes.h"
-#include "renderer/assets/text_cursor.h"
+#include "base/text_cursor.h"
 #include "renderer/mesh_reader/assimp_reader.h"
 
 namespace narpa {

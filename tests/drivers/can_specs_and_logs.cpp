@@ -95,10 +95,9 @@ TEST_F(CanLog, BadLineIsNamed) {
 TEST_F(CanLog, ByteOrderMarkAndLineEndsOfOtherSystemsAreRead) {
     std::string utf16("\xff\xfe", 2);
     for (const char c : std::string("(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n")) utf16 += c, utf16 += '\0';
-    for (const std::string& text :
-         {std::string("\xef\xbb\xbf(1.0) vcan0 123#00\n(2.0) vcan0 123#01\n"),
-          std::string("\xef\xbb\xbf(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n"),
-          std::string("(1.0) vcan0 123#00\r(2.0) vcan0 123#01\r"), utf16}) {
+    for (const std::string& text : {std::string("\xef\xbb\xbf(1.0) vcan0 123#00\n(2.0) vcan0 123#01\n"),
+                                    std::string("\xef\xbb\xbf(1.0) vcan0 123#00\r\n(2.0) vcan0 123#01\r\n"),
+                                    std::string("(1.0) vcan0 123#00\r(2.0) vcan0 123#01\r"), utf16}) {
         auto bus = open_or_fail(write(text), CanRole::hub);
         ASSERT_TRUE(bus);
         ReceivedFrame out;

@@ -63,12 +63,13 @@ Status read_obj_materials(const std::string& path, const std::vector<std::string
 /// A table of plates (.tab): OBJ, or the numbers of vertices and faces with a row of numbers for each.
 Result<TriangleSoup> read_plates(const std::string& path);
 
-/// Edges of all faces, as numbers of vertices in the file.
-using PlateEdges = std::vector<std::array<std::uint32_t, 2>>;
+/// Triangles, as numbers of vertices in the file.
+using PlateFaces = std::vector<std::array<std::uint32_t, 3>>;
 /// Whether faces count vertices from 0 or 1. 0: a face has vertex 0; or none has the last vertex, and counted from
-/// 0 the surface is closed rather than open, has fewer edges without length, or edges shorter by 1 % in all. A
-/// warning tells which, unless a face has the last vertex. Error: both 0 and a number beyond the last vertex.
-Result<std::uint32_t> plate_base(const PlateEdges& edges, const std::vector<Vec3>& positions,
+/// 0 the surface is closed rather than open, or has fewer edges without length, or, by 1 %, more volume for its
+/// area (open: shorter edges). A warning tells which, unless a face has the last vertex. Error: both 0 and a number
+/// beyond the last vertex.
+Result<std::uint32_t> plate_base(const PlateFaces& faces, const std::vector<Vec3>& positions,
                                  const std::string& path, std::vector<std::string>& warnings);
 
 /// An sRGB colour, each band from 0 to 1, as linear light.

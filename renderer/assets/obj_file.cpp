@@ -220,12 +220,13 @@ private:
     /// Finds out where the faces of a table of plates count from.
     bool count_from_base() {
         if (!check_forward_references()) return false;
-        PlateEdges edges;
+        PlateFaces faces;
         for (const Polygon& polygon : polygons_)
-            for (std::size_t i = 0; i < polygon.count; ++i)
-                edges.push_back({corners_[polygon.first + i].position,
-                                 corners_[polygon.first + (i + 1) % polygon.count].position});
-        const Result<std::uint32_t> base = plate_base(edges, soup_.positions, path_, soup_.warnings);
+            for (std::size_t i = 1; i + 1 < polygon.count; ++i) {
+                const TriangleSoup::Corner* corner = &corners_[polygon.first];
+                faces.push_back({corner[0].position, corner[i].position, corner[i + 1].position});
+            }
+        const Result<std::uint32_t> base = plate_base(faces, soup_.positions, path_, soup_.warnings);
         if (!base) {
             error_ = base.error();
             return false;

@@ -19,17 +19,25 @@ namespace {
 struct PlateFit {
     bool is_closed = true;  ///< each edge occurs equally often in both directions, vertices identified by position
     std::size_t collapsed = 0;  ///< edges without length
-    double length = 0;          ///< of all edges
+    double shape = 0;           ///< closed: volume / area^1.5; open: 1 / length of all edges
 
-    PlateFit(const PlateEdges& edges, std::uint32_t first, const std::vector<Vec3>& positions) {
+    PlateFit(const PlateFaces& faces, std::uint32_t first, const std::vector<Vec3>& positions) {
         const std::vector<std::uint32_t> point = points_of(positions);
         std::vector<std::array<std::uint32_t, 3>> sides;  // the lower end, the upper end, the direction
-        sides.reserve(edges.size());
-        for (const auto& [from, to] : edges) {
-            const std::uint32_t a = point[from - first], b = point[to - first];
-            if (a == b) ++collapsed;
-            if (a != b) sides.push_back({std::min(a, b), std::max(a, b), a < b ? 1u : 0u});
-            length += norm(positions[from - first] - positions[to - first]);
+        sides.reserve(3 * faces.size());
+        double volume = 0, area = 0, length = 0;
+        for (const auto& f : faces) {
+            std::array<Vec3, 3> p;
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::uint32_t from = f[k] - first, to = f[(k + 1) % 3] - first, a = point[from],
+                                    b = point[to];
+                if (a == b) ++collapsed;
+                if (a != b) sides.push_back({std::min(a, b), std::max(a, b), a < b ? 1u : 0u});
+                length += norm(positions[from] - positions[to]);
+                p[k] = positions[from] - positions[0];
+            }
+            volume += dot(p[0], cross(p[1], p[2])) / 6;
+            area += norm(cross(p[1] - p[0], p[2] - p[0])) / 2;
         }
         std::ranges::sort(sides);
         for (std::size_t i = 0, end = 0; i < sides.size() && is_closed; i = end) {
@@ -38,11 +46,12 @@ struct PlateFit {
                 upwards += sides[end][2];
             is_closed = 2 * upwards == end - i;
         }
+        shape = is_closed ? std::abs(volume) / std::pow(area, 1.5) : 1 / length;
     }
     [[nodiscard]] bool is_better_than(const PlateFit& other) const {
         if (is_closed != other.is_closed) return is_closed;
         if (collapsed != other.collapsed) return collapsed < other.collapsed;
-        return length < 0.99 * other.length;
+        return shape > 1.01 * other.shape;
     }
 
 private:
@@ -155,13 +164,12 @@ private:
     }
 
     bool find_base() {
-        PlateEdges edges;
+        PlateFaces faces;
         for (const auto& t : soup_.triangles)
-            for (std::size_t k = 0; k < 3; ++k)
-                edges.push_back({t.corners[k].position, t.corners[(k + 1) % 3].position});
+            faces.push_back({t.corners[0].position, t.corners[1].position, t.corners[2].position});
         const Result<std::uint32_t> base = first_vertex_ == 0.0 || first_vertex_ == 1.0
-                                               ? check_base(edges, static_cast<std::uint32_t>(*first_vertex_))
-                                               : plate_base(edges, soup_.positions, path_, soup_.warnings);
+                                               ? check_base(faces, static_cast<std::uint32_t>(*first_vertex_))
+                                               : plate_base(faces, soup_.positions, path_, soup_.warnings);
         if (!base) {
             error_ = base.error();
             return false;
@@ -172,12 +180,14 @@ private:
     }
 
     /// The numbers of the vertices' rows say where faces count from.
-    [[nodiscard]] Result<std::uint32_t> check_base(const PlateEdges& edges, std::uint32_t base) const {
-        for (const auto& [from, to] : edges)
-            if (from < base || from - base >= vertices_)
-                return Error{.what = fmt::format("a face with vertex {}, the rows of vertices count from {} to {}",
-                                                 from, base, vertices_ + base - 1),
-                             .file = path_};
+    [[nodiscard]] Result<std::uint32_t> check_base(const PlateFaces& faces, std::uint32_t base) const {
+        for (const auto& face : faces)
+            for (const std::uint32_t v : face)
+                if (v < base || v - base >= vertices_)
+                    return Error{
+                        .what = fmt::format("a face with vertex {}, the rows of vertices count from {} to {}", v,
+                                            base, vertices_ + base - 1),
+                        .file = path_};
         return base;
     }
 
@@ -194,15 +204,16 @@ private:
 
 }  // namespace
 
-Result<std::uint32_t> plate_base(const PlateEdges& edges, const std::vector<Vec3>& positions,
+Result<std::uint32_t> plate_base(const PlateFaces& faces, const std::vector<Vec3>& positions,
                                  const std::string& path, std::vector<std::string>& warnings) {
     std::uint32_t low = 0xffff'ffffu, high = 0;
-    for (const auto& edge : edges) low = std::min(low, edge[0]), high = std::max(high, edge[0]);
+    for (const auto& face : faces)
+        for (const std::uint32_t v : face) low = std::min(low, v), high = std::max(high, v);
     const std::size_t n = positions.size();
     if (low == 0 && high >= n)
         return Error{.what = fmt::format("faces with vertices 0 to {}, the file has {}", high, n), .file = path};
-    if (edges.empty() || high >= n) return 1u;
-    if (low == 0 || PlateFit(edges, 0, positions).is_better_than(PlateFit(edges, 1, positions))) {
+    if (faces.empty() || high >= n) return 1u;
+    if (low == 0 || PlateFit(faces, 0, positions).is_better_than(PlateFit(faces, 1, positions))) {
         warnings.push_back(path + ": its faces count vertices from 0");
         return 0u;
     }

@@ -211,10 +211,10 @@ bool GltfFile::data_of_uri(const std::string& uri, std::string& bytes) {
 }
 
 std::string GltfFile::path_of_uri(const std::string& uri) const {
-    const std::string decoded = texture_path(path_, percent_decoded(uri));
+    std::string decoded = texture_path(path_, percent_decoded(uri));
     std::error_code problem;
     if (std::filesystem::exists(decoded, problem)) return decoded;
-    const std::string as_written = texture_path(path_, uri);
+    std::string as_written = texture_path(path_, uri);
     return std::filesystem::exists(as_written, problem) ? as_written : decoded;
 }
 

@@ -148,7 +148,7 @@ private:
             if (Status read = file_.read(e, i, v); !read) return read;
             const std::uint32_t colour = colour_of(colours, v);
             const std::vector<double>& corners = v[static_cast<std::size_t>(list)];
-            const Status added =
+            Status added =
                 is_strips
                     ? add_strips(corners, colour)
                     : add_face(corners, wedge < 0 ? std::vector<double>{} : v[static_cast<std::size_t>(wedge)],

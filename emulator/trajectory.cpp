@@ -14,23 +14,26 @@ namespace {
 
 constexpr int kColumns = 15;
 
-Result<TrajectoryRow> read_row(std::string_view line, const std::string& path, int number) {
-    const auto bad = [&](std::string_view at, std::string what) {
-        return Error{std::move(what), path, number, static_cast<int>(at.data() - line.data()) + 1};
+Result<TrajectoryRow> read_row(const CsvRow& csv, const std::string& path) {
+    const auto bad = [&](std::string_view cell, std::string what) {
+        return Error{std::move(what), path, csv.number, csv.column_of(cell)};
     };
-    std::vector<std::string_view> cells = cells_of(line);
-    std::ranges::transform(cells, cells.begin(), trimmed);
+    const std::vector<std::string_view>& cells = csv.cells;
     if (cells.size() != kColumns)
-        return bad(line, fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kTrajectoryHeader));
+        return bad(cells.front(),
+                   fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kTrajectoryHeader));
     std::array<double, kColumns> v{};
     for (std::size_t i = 0; i < kColumns; ++i) {
-        if (i != 1 && !(read_number(cells[i], v[i]) && std::isfinite(v[i])))
+        if (i == 1) continue;
+        const std::optional<double> number = csv.number_in(cells[i]);
+        if (!number || !std::isfinite(*number))
             return bad(cells[i], fmt::format("\"{}\" where a finite number was expected", cells[i]));
+        v[i] = *number;
     }
-    if (std::abs(v[0]) > 9e9) return bad(line, fmt::format("time {} s, expected less than 9e9 s", v[0]));
+    if (std::abs(v[0]) > 9e9) return bad(cells[0], fmt::format("time {} s, expected less than 9e9 s", v[0]));
     if (cells[1].empty()) return bad(cells[1], "empty body name");
 
-    TrajectoryRow row{std::llround(v[0] * 1e9), std::string(cells[1]), {}, number};
+    TrajectoryRow row{std::llround(v[0] * 1e9), std::string(cells[1]), {}, csv.number};
     row.motion = {{{v[5], v[6], v[7], v[8]}, {v[2], v[3], v[4]}}, {v[9], v[10], v[11]}, {v[12], v[13], v[14]}};
     if (!accept_attitude(row.motion.T_world_body.q))
         return bad(cells[5], fmt::format("attitude of norm {:.6g}, expected a unit quaternion (w, x, y, z)",
@@ -50,21 +53,20 @@ bool accept_attitude(Quat& q) noexcept {
 Result<std::vector<TrajectoryRow>> read_trajectory(const std::string& path) {
     std::vector<TrajectoryRow> rows;
     std::map<std::string, std::int64_t> last;
-    const auto take = [&](std::string_view line, int number) -> Status {
-        auto row = read_row(line, path, number);
+    const auto take = [&](const CsvRow& csv) -> Status {
+        auto row = read_row(csv, path);
         if (!row) return row.error();
         const auto [at, first] = last.try_emplace(row->body, row->t_ns);
         if (!first && row->t_ns <= at->second)
             return Error{fmt::format("time {} s of body \"{}\" does not come after its last row ({} s)",
                                      static_cast<double>(row->t_ns) * 1e-9, row->body,
                                      static_cast<double>(at->second) * 1e-9),
-                         path, number, 1};
+                         path, csv.number, 1};
         at->second = row->t_ns;
         rows.push_back(*std::move(row));
         return Ok{};
     };
-    if (auto read = read_csv_lines(path, kTrajectoryHeader, "a trajectory", "row", take); !read)
-        return read.error();
+    if (auto read = read_csv_rows(path, kTrajectoryHeader, "a trajectory", "row", take); !read) return read.error();
     return rows;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/csv.h"
+#include "base/read_number.h"
 #include "protocols/ledger_fields.h"
 
 namespace narpa {
@@ -131,13 +132,15 @@ Result<std::vector<LoggedFrame>> read_ledger_log(const std::string& path) {
         return Error{std::move(what), path, line, static_cast<int>(column)};
     };
     std::ifstream in(path);
-    std::string line;
     if (!in) return bad(0, 0, "cannot be read, expected the ledger log of a camera");
-    if (!std::getline(in, line) || line != ledger_header())
+    TextLines lines(in);
+    std::string_view line;
+    if (!lines.next(line) || line != ledger_header())
         return bad(1, 1, fmt::format("expected the header line \"{}\"", ledger_header()));
     constexpr std::size_t columns = kLedgerColumns.size() + 1;
     std::vector<LoggedFrame> frames;
-    for (int number = 2; std::getline(in, line); ++number) {
+    while (lines.next(line)) {
+        const int number = lines.number();
         const std::vector<std::string_view> cells = cells_of(line);
         if (cells.size() != columns)
             return bad(number, 1,

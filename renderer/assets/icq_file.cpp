@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "base/file_bytes.h"
+#include "base/text_cursor.h"
 #include "renderer/assets/mesh_readers.h"
-#include "renderer/assets/text_cursor.h"
 
 namespace narpa {
 

@@ -9,48 +9,12 @@
 #include "base/file_bytes.h"
 #include "renderer/assets/mesh_process.h"
 #include "renderer/assets/mesh_readers.h"
+#include "renderer/assets/numbering.h"
 #include "renderer/assets/smooth_normals.h"
 
 namespace narpa {
 
 namespace {
-
-/// Gives equal keys the same number, counting from 0 in the order in which they first appear.
-template <std::size_t N>
-class Numbering {
-public:
-    using Key = std::array<std::uint32_t, N>;
-    explicit Numbering(std::size_t expected) : slots_(std::bit_ceil(2 * expected + 16), kFree) {
-        keys_.reserve(expected);
-    }
-    std::uint32_t number(const Key& key) {
-        if (2 * (keys_.size() + 1) > slots_.size()) grow();
-        std::uint32_t& slot = slots_[find(key)];
-        if (slot == kFree) {
-            slot = static_cast<std::uint32_t>(keys_.size());
-            keys_.push_back(key);
-        }
-        return slot;
-    }
-    [[nodiscard]] const std::vector<Key>& keys() const { return keys_; }
-
-private:
-    static constexpr std::uint32_t kFree = 0xffff'ffffu;
-
-    [[nodiscard]] std::size_t find(const Key& key) const {
-        std::uint64_t h = 0x9e37'79b9'7f4a'7c15ull;
-        for (const std::uint32_t word : key) h = (h ^ word) * 0xff51'afd7'ed55'8ccdull, h ^= h >> 32;
-        std::size_t i = h & (slots_.size() - 1);
-        while (slots_[i] != kFree && keys_[slots_[i]] != key) i = (i + 1) & (slots_.size() - 1);
-        return i;
-    }
-    void grow() {
-        slots_.assign(2 * slots_.size(), kFree);
-        for (std::size_t k = 0; k < keys_.size(); ++k) slots_[find(keys_[k])] = static_cast<std::uint32_t>(k);
-    }
-    std::vector<std::uint32_t> slots_;
-    std::vector<Key> keys_;
-};
 
 /// Bit pattern for keys, equal for equal numbers: -0 counts as 0.
 std::uint32_t bits(float x) {
@@ -84,6 +48,7 @@ public:
           points_(soup.positions.size()),
           triangles_(soup.triangles.size()),
           vertices_(soup.positions.size()),
+          colours_(soup.colours.empty() ? 0 : soup.positions.size()),
           last_(soup.positions.size()) {
         scaled_.reserve(soup.positions.size());
         for (const Vec3& p : soup.positions) scaled_.push_back(vec_cast<float>(scale * p));
@@ -93,16 +58,22 @@ public:
 
     MeshFile build() {
         for (const TriangleSoup::Triangle& t : soup_.triangles) sift(t);
-        const bool with_normals = !soup_.normals.empty(), with_uvs = !soup_.uvs.empty();
+        const bool with_normals = !soup_.normals.empty(), with_uvs = !soup_.uvs.empty(),
+                   with_colours = !soup_.colours.empty();
         const std::size_t n = vertices_.keys().size();
         out_.mesh.positions.reserve(n);
         if (with_normals) out_.mesh.normals.reserve(n);
         if (with_uvs) out_.mesh.uvs.reserve(n);
+        if (with_colours) out_.mesh.colours.reserve(n);
         for (const VertexKey& v : vertices_.keys()) {
             const auto& p = points_.keys()[v[0]];
             out_.mesh.positions.push_back({from_bits(p[0]), from_bits(p[1]), from_bits(p[2])});
             if (with_normals) out_.mesh.normals.push_back({from_bits(v[1]), from_bits(v[2]), from_bits(v[3])});
             if (with_uvs) out_.mesh.uvs.push_back({from_bits(v[4]), from_bits(v[5])});
+            if (with_colours) {
+                const auto& c = colours_.keys()[v[6]];
+                out_.mesh.colours.push_back({from_bits(c[0]), from_bits(c[1]), from_bits(c[2])});
+            }
         }
         out_.materials = std::move(soup_.materials);
         out_.warnings = std::move(soup_.warnings);
@@ -110,7 +81,7 @@ public:
     }
 
 private:
-    using VertexKey = std::array<std::uint32_t, 6>;  // point, normal x y z, u, v
+    using VertexKey = std::array<std::uint32_t, 7>;  // point, normal x y z, u, v, colour
 
     void sift(const TriangleSoup::Triangle& t) {
         std::array<Vec3f, 3> p;
@@ -137,11 +108,12 @@ private:
         for (std::size_t i = 0; i < 3; ++i) {
             const TriangleSoup::Corner& c = t.corners[i];
             Last& last = last_[c.position];
-            if (last.vertex == kUnknown || last.uv != c.uv || last.normal != c.normal) {
+            if (last.vertex == kUnknown || last.uv != c.uv || last.normal != c.normal || last.colour != c.colour) {
                 const auto [n, is_flat] = normal_of(c, flat);
                 const std::array<float, 2> uv = uv_of(c);
-                face[i] = vertices_.number({point[i], bits(n.x), bits(n.y), bits(n.z), bits(uv[0]), bits(uv[1])});
-                last = {point[i], c.uv, c.normal, is_flat ? kUnknown : face[i]};
+                face[i] = vertices_.number(
+                    {point[i], bits(n.x), bits(n.y), bits(n.z), bits(uv[0]), bits(uv[1]), colour_of(c)});
+                last = {point[i], c.uv, c.normal, c.colour, is_flat ? kUnknown : face[i]};
             } else {
                 face[i] = last.vertex;
             }
@@ -170,16 +142,25 @@ private:
         return std::isfinite(uv[0]) && std::isfinite(uv[1]) ? uv : std::array<float, 2>{0, 0};
     }
 
+    /// The number of the corner's colour, from 0 to 1 in each band.
+    [[nodiscard]] std::uint32_t colour_of(const TriangleSoup::Corner& c) {
+        if (soup_.colours.empty()) return 0;
+        const Rgb colour = c.colour == TriangleSoup::kNone ? Rgb{1, 1, 1} : soup_.colours[c.colour];
+        const auto part = [](float x) { return bits(x > 0 ? std::min(x, 1.0f) : 0.0f); };  // NaN is 0
+        return colours_.number({part(colour.x), part(colour.y), part(colour.z)});
+    }
+
     static constexpr std::uint32_t kUnknown = 0xffff'ffffu;
     /// Cache: the last vertex used at a position, which most other triangles there share.
     struct Last {
-        std::uint32_t point = kUnknown, uv = 0, normal = 0, vertex = kUnknown;
+        std::uint32_t point = kUnknown, uv = 0, normal = 0, colour = 0, vertex = kUnknown;
     };
 
     TriangleSoup& soup_;
     std::vector<Vec3f> scaled_;
     Numbering<3> points_, triangles_;
-    Numbering<6> vertices_;
+    Numbering<7> vertices_;
+    Numbering<3> colours_;
     std::vector<Last> last_;
     MeshFile out_;
 };
@@ -200,10 +181,39 @@ void take_textures_off_bare_triangles(TriangleSoup& soup, const std::string& pat
                 fmt::format("{}: triangles of material \"{}\" have no texture coordinates; its "
                             "textures are not used on them",
                             path, soup.materials[t.material].material.name));
-            soup.materials.push_back({.material = soup.materials[t.material].material});
+            soup.materials.push_back({.material = soup.materials[t.material].material,
+                                      .is_grey_by_default = soup.materials[t.material].is_grey_by_default});
         }
         t.material = static_cast<std::uint16_t>(without);
     }
+}
+
+/// Triangles with a colour at each corner get their material with vertex colours.
+void use_vertex_colours(TriangleSoup& soup, const std::string& path) {
+    if (soup.colours.empty()) return;
+    std::vector<std::size_t> coloured(soup.materials.size(), 0);  // the material with vertex colours; 0 is none yet
+    std::size_t partly = 0;
+    for (TriangleSoup::Triangle& t : soup.triangles) {
+        const auto given =
+            std::ranges::count_if(t.corners, [](const auto& c) { return c.colour != TriangleSoup::kNone; });
+        partly += given == 1 || given == 2;
+        if (given < 3) continue;
+        std::size_t& with = coloured[t.material];
+        if (with == 0) {
+            if (soup.materials.size() >= kMaxMaterials)
+                return soup.warnings.push_back(path + ": has too many materials for vertex colours on all of them");
+            with = soup.materials.size();
+            MeshMaterial m = soup.materials[t.material];
+            m.material.vertex_colours = 0;
+            if (m.is_grey_by_default) m.material.diffuse = {1, 1, 1};
+            soup.materials.push_back(std::move(m));
+        }
+        t.material = static_cast<std::uint16_t>(with);
+    }
+    if (partly > 0)
+        soup.warnings.push_back(
+            fmt::format("{}: {} triangle{} with colours at some corners only: they are not used", path, partly,
+                        partly > 1 ? "s" : ""));
 }
 
 void tell_dropped(MeshFile& file, const std::string& path) {
@@ -223,21 +233,24 @@ Result<MeshFile> read_mesh(const std::string& path, double scale, double crease_
                            const MeshReaderLimits& limits) {
     if (const Status plain = check_plain_file(path); !plain) return plain.error();
     const std::string extension = extension_of(path);
-    const bool is_obj = extension == ".obj" || extension == ".tab";
-    const bool is_icq = extension == ".icq";
-    if (!is_obj && !is_icq && !is_read_in_process(extension))
+    const bool is_obj = extension == ".obj", is_plates = extension == ".tab", is_icq = extension == ".icq";
+    if (!is_obj && !is_plates && !is_icq && !is_read_in_process(extension))
         return Error{.what = fmt::format("not a mesh format that can be read, expected {}", kMeshExtensions),
                      .file = path};
-    Result<TriangleSoup> soup = is_obj   ? read_obj(path)
-                                : is_icq ? read_icq(path)
-                                         : read_soup_in_process(path, limits);
+    Result<TriangleSoup> soup = is_obj      ? read_obj(path)
+                                : is_plates ? read_plates(path)
+                                : is_icq    ? read_icq(path)
+                                            : read_soup_in_process(path, limits);
     if (!soup) return soup.error();
     take_textures_off_bare_triangles(*soup, path);
+    use_vertex_colours(*soup, path);
     if (soup->triangles.empty())
         return Error{.what = "no triangles in it, expected a mesh with faces", .file = path};
     const std::size_t given = soup->triangles.size();
     if (crease_rad > 0 && soup->normals.empty())
         add_smooth_normals(*soup, crease_rad);
+    else if (soup->has_smoothing_groups && crease_rad == 0)
+        soup->warnings.push_back(path + ": smoothing groups (s) are not used; crease_angle_deg smooths edges");
     else if (crease_rad > 0)
         soup->warnings.push_back(path + ": has normals of its own, crease_angle_deg is not used");
     MeshFile file = MeshBuilder(*soup, scale).build();

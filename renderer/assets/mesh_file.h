@@ -1,5 +1,5 @@
-/// renderer/assets/mesh_file.h - mesh files -> triangles: OBJ by our own reader (mesh_readers.h says why), others
-/// by Assimp in a process of its own (mesh_process.h).
+/// renderer/assets/mesh_file.h - mesh files -> triangles: OBJ, ICQ and tables of plates here, others in a process
+/// of their own (mesh_process.h).
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace narpa {
 
-/// Of narpa-mesh-reader, the process that reads all formats but OBJ.
+/// Of narpa-mesh-reader, the process that reads glTF, PLY, STL, 3DS and DAE.
 struct MeshReaderLimits {
     std::uint64_t memory_bytes = std::uint64_t{4} << 30;  ///< of the process, and of the data that it sends
     int seconds = 60;                                     ///< wall time
@@ -30,6 +30,7 @@ struct MeshTexture {
 /// A material as a mesh file gives it.
 struct MeshMaterial {
     Material material;
+    bool is_grey_by_default = false;  ///< the file gives no diffuse colour: vertex colours replace it
     MeshTexture colour{}, emission{}, normal{};
     MeshTexture bump{};                      ///< MTL's: a normal map or a height map, decided by its image
     std::optional<float> bump_multiplier{};  ///< MTL's -bm

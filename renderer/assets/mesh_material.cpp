@@ -1,4 +1,5 @@
 #include "renderer/assets/mesh_readers.h"
+#include "renderer/assets/texture_file.h"
 
 #include <algorithm>
 
@@ -57,8 +58,14 @@ Material material_from_mtl(const MtlMaterial& given) {
 
 }  // namespace
 
+Rgb linear_colour(const Rgb& srgb) {
+    const auto linear = [](float code) { return static_cast<float>(linear_from_srgb(static_cast<double>(code))); };
+    return {linear(srgb.x), linear(srgb.y), linear(srgb.z)};
+}
+
 MeshMaterial from_mtl(const MtlMaterial& given) {
     MeshMaterial out{.material = material_from_mtl(given),
+                     .is_grey_by_default = !given.kd && !given.map_kd.named(),
                      .colour = given.map_kd,
                      .emission = given.map_ke,
                      .normal = given.norm,

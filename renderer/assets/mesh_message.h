@@ -20,13 +20,14 @@ struct PlainMaterial {
         Kind kind = Kind::diffuse_and_lobe;
         Rgb diffuse{}, specular{}, emission{};  ///< diffuse: base colour of metallic_roughness
         float exponent = 0, metallic = 1, roughness = 1, ior = 1.5f, normal_scale = 1;
+        bool is_grey_by_default = false;
     } numbers;
     std::string name;
     MeshTexture colour{}, emission{}, normal{};
 };
 
 struct MeshMessage {
-    static constexpr std::uint64_t kMagic = 0x3130'4853'454d'4e01;
+    static constexpr std::uint64_t kMagic = 0x3130'4853'454d'4e02;
     std::uint64_t magic = kMagic;
     std::string error{};  ///< empty: the mesh follows
     int line = 0, column = 0;
@@ -91,7 +92,7 @@ bool transfer(Stream& stream, MeshMessage& m) {
     if (!m.error.empty()) return true;
     TriangleSoup& s = m.soup;
     return array(stream, s.positions) && array(stream, s.normals) && array(stream, s.uvs) &&
-           array(stream, s.triangles) &&
+           array(stream, s.colours) && array(stream, s.triangles) &&
            list(stream, s.warnings, [&](std::string& text) { return array(stream, text); }) &&
            list(stream, m.materials, [&](PlainMaterial& material) { return transfer(stream, material); });
 }

@@ -24,6 +24,7 @@ MeshMaterial checked(PlainMaterial&& m) {
             break;
         default: out.material = diffuse_and_lobe(std::move(m.name), n.diffuse, n.specular, n.exponent, n.emission);
     }
+    out.is_grey_by_default = n.is_grey_by_default;
     out.material.normal_scale = n.normal_scale > 0 ? std::min(n.normal_scale, 100.0f) : 0.0f;
     for (MeshTexture* t : {&m.colour, &m.emission, &m.normal})
         if (t->wrap != Texture::Wrap::clamp) t->wrap = Texture::Wrap::repeat;
@@ -38,7 +39,8 @@ bool indices_are_sound(const TriangleSoup& s) {
     for (const TriangleSoup::Triangle& t : s.triangles) {
         if (t.material >= s.materials.size()) return false;
         for (const TriangleSoup::Corner& c : t.corners)
-            if (c.position >= s.positions.size() || !in(c.uv, s.uvs.size()) || !in(c.normal, s.normals.size()))
+            if (c.position >= s.positions.size() || !in(c.uv, s.uvs.size()) || !in(c.normal, s.normals.size()) ||
+                !in(c.colour, s.colours.size()))
                 return false;
     }
     return true;

@@ -1,21 +1,26 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <set>
 
 #include "base/file_bytes.h"
+#include "base/text_cursor.h"
 #include "renderer/assets/mesh_readers.h"
-#include "renderer/assets/text_cursor.h"
 
 namespace narpa {
 
 namespace {
 
+/// First words of lines; what follows a backslash at the end of a name is not one.
+constexpr std::array<std::string_view, 13> kMtlKeywords{"newmtl", "Ka", "Kd", "Ks",     "Ke",     "Ns",   "Ni",
+                                                        "d",      "Tr", "Tf", "map_Kd", "map_Ke", "illum"};
+
 class MtlReader {
 public:
     MtlReader(std::string text, const std::string& path, std::map<std::string, MeshMaterial>& materials,
               std::vector<std::string>& warnings)
-        : in_(std::move(text), path), path_(path), materials_(materials), warnings_(warnings) {}
+        : in_(std::move(text), path, kMtlKeywords), path_(path), materials_(materials), warnings_(warnings) {}
 
     Status read() {
         while (in_.next_line())
@@ -23,7 +28,8 @@ public:
         finish();
         warn(transparent_, "transparent (d, Tr), drawn opaque");
         warn(with_options_, "options of maps passed over, all but -clamp and -bm");
-        tell_unused_maps();
+        tell_unused(unused_maps_, "maps");
+        tell_unused(unused_, "statements");
         return Ok{};
     }
 
@@ -34,10 +40,10 @@ private:
                 fmt::format("{}: {} material{}: {}", path_, materials, materials > 1 ? "s" : "", what));
     }
 
-    void tell_unused_maps() {
+    void tell_unused(const std::set<std::string>& keywords, std::string_view kind) {
         std::string all;
-        for (const std::string& keyword : unused_maps_) all += (all.empty() ? "" : ", ") + keyword;
-        if (!all.empty()) warnings_.push_back(fmt::format("{}: maps that are not used: {}", path_, all));
+        for (const std::string& keyword : keywords) all += (all.empty() ? "" : ", ") + keyword;
+        if (!all.empty()) warnings_.push_back(fmt::format("{}: {} that are not used: {}", path_, kind, all));
     }
 
     bool fail(std::string_view token, std::string what) {
@@ -49,7 +55,7 @@ private:
         const std::string_view keyword = in_.token();
         if (keyword == "newmtl") {
             finish();
-            given_ = MtlMaterial{.name = std::string(in_.rest())};
+            given_ = MtlMaterial{.name = material_name(in_.rest())};
             return true;
         }
         return !given_ || read_statement(keyword, *given_);
@@ -72,6 +78,9 @@ private:
         if (keyword == "bump" || keyword == "map_bump" || keyword == "map_Bump") return read_map(m.bump);
         if (keyword.starts_with("map_") || keyword == "disp" || keyword == "decal" || keyword == "refl")
             unused_maps_.emplace(keyword);
+        else if (!keyword.empty() && keyword != "Ka" && keyword != "Tf" && keyword != "sharpness" &&
+                 number_from(in_.token()) != 0.0)
+            unused_.emplace(keyword.substr(0, 20));
         return true;
     }
 
@@ -169,10 +178,15 @@ private:
     std::optional<MtlMaterial> given_;
     std::optional<Error> error_;
     int transparent_ = 0, with_options_ = 0;
-    std::set<std::string> unused_maps_;
+    std::set<std::string> unused_maps_, unused_;
 };
 
 }  // namespace
+
+std::string material_name(std::string_view rest_of_line) {
+    while (rest_of_line.ends_with('\\') || rest_of_line.ends_with(' ')) rest_of_line.remove_suffix(1);
+    return std::string(rest_of_line);
+}
 
 Status read_mtl(const std::string& path, std::map<std::string, MeshMaterial>& materials,
                 std::vector<std::string>& warnings) {

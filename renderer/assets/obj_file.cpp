@@ -2,27 +2,34 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <set>
 
 #include "base/file_bytes.h"
-#include "renderer/assets/text_cursor.h"
+#include "base/text_cursor.h"
 
 namespace narpa {
 
 namespace {
 
-constexpr const char* kNoMaterial = "default";
+constexpr std::array<std::string_view, 12> kObjKeywords{"v", "vt", "vn", "vp", "f",      "l",
+                                                        "p", "s",  "g",  "o",  "usemtl", "mtllib"};
 
 class ObjReader {
 public:
-    ObjReader(std::string text, const std::string& path) : in_(std::move(text), path), path_(path) {}
+    ObjReader(std::string text, const std::string& path)
+        : in_(std::move(text), path, kObjKeywords), path_(path), is_plates_(extension_of(path) == ".tab") {}
 
     Result<TriangleSoup> read() {
         while (in_.next_line())
             if (!read_line()) return *error_;
-        if (!check_forward_references()) return *error_;
+        if (!(is_plates_ ? count_from_base() : check_forward_references())) return *error_;
+        finish_colours();
         cut_polygons();
         if (!read_materials()) return *error_;
+        tell_unused();
         return std::move(soup_);
     }
 
@@ -49,8 +56,26 @@ private:
         if (keyword == "vt") return read_uv();
         if (keyword == "vn") return read_normal();
         if (keyword == "usemtl") return use_material(keyword);
-        if (keyword == "mtllib") libraries_.emplace_back(in_.rest());
+        if (keyword == "mtllib")
+            libraries_.emplace_back(in_.rest());
+        else if (keyword == "s")
+            is_smooth_ = std::ranges::find(kFlat, in_.token()) == kFlat.end();
+        else if (!keyword.empty() && keyword != "g" && keyword != "o")
+            unused_.emplace(keyword.substr(0, 20));
         return true;
+    }
+
+    void tell_unused() {
+        constexpr std::size_t kMost = 8;
+        std::string all;
+        std::size_t n = 0;
+        for (const std::string& keyword : unused_)
+            if (++n <= kMost) all += (all.empty() ? "" : ", ") + keyword;
+        if (n > kMost) all += fmt::format(" and {} others", n - kMost);
+        if (n > 0) soup_.warnings.push_back(fmt::format("{}: statements that are not used: {}", path_, all));
+        if (has_odd_vertices_)
+            soup_.warnings.push_back(
+                path_ + ": vertices with further numbers that are neither a weight nor a colour: not used");
     }
 
     bool read_number(double& x) {
@@ -66,8 +91,35 @@ private:
         Vec3 p;
         for (int i = 0; i < 3; ++i)
             if (!read_number(p[i])) return false;
-        soup_.positions.push_back(p);  // a weight or a colour may follow, and is passed over
+        soup_.positions.push_back(p);
+        if (const std::string_view token = in_.token(); !token.empty()) read_colour(token);
         return true;
+    }
+
+    /// Behind a position: a weight, which only curves use; a colour; or a colour and its alpha.
+    void read_colour(std::string_view token) {
+        std::array<float, 4> x{};
+        std::size_t n = 0;
+        for (; !token.empty() && n < x.size(); token = in_.token()) {
+            const std::optional<double> number = number_from(token);
+            if (!number) break;
+            x[n++] = static_cast<float>(*number);
+        }
+        if (n < 3 || !token.empty()) return void(has_odd_vertices_ |= n != 1 || !token.empty());
+        colour_of_.resize(soup_.positions.size() - 1, TriangleSoup::kNone);
+        colour_of_.push_back(static_cast<std::uint32_t>(soup_.colours.size()));
+        soup_.colours.push_back({x[0], x[1], x[2]});
+    }
+
+    /// Colours are sRGB, from 0 to 1, or to 255 where one is above 2.
+    void finish_colours() {
+        if (soup_.colours.empty()) return;
+        const bool are_codes = std::ranges::any_of(soup_.colours, [](const Rgb& c) {
+            return std::max({c.x, c.y, c.z}) > 2;
+        });
+        for (Rgb& c : soup_.colours) c = linear_colour(are_codes ? c / 255.0f : c);
+        colour_of_.resize(soup_.positions.size(), TriangleSoup::kNone);
+        for (TriangleSoup::Corner& c : corners_) c.colour = colour_of_[c.position];
     }
 
     bool read_normal() {
@@ -99,8 +151,9 @@ private:
         if (count < 3) return fail(keyword, fmt::format("a face of {} corners, expected at least 3", count));
         if (count > kMaxCorners)
             return fail(keyword, fmt::format("a face of {} corners, expected at most {}", count, kMaxCorners));
-        if (!material_) material_ = material_number(kNoMaterial);
+        if (!material_) material_ = material_number(kObjDefaultMaterial);
         polygons_.push_back({first, count, *material_});
+        soup_.has_smoothing_groups |= is_smooth_ && corners_.back().normal == TriangleSoup::kNone;
         return true;
     }
 
@@ -128,12 +181,19 @@ private:
         if (problem != std::errc() || end != digits.data() + digits.size())
             return fail(digits, fmt::format("\"{}\" is not an index", digits));
         const auto have = static_cast<std::int64_t>(count_of(part));
+        const bool is_position = part == &TriangleSoup::Corner::position;
+        if (is_plates_ && i >= 0 && i < TriangleSoup::kNone && is_position) {
+            index = static_cast<std::uint32_t>(i);
+            if (i > have) forward_.push_back({digits, part, i});
+            return true;
+        }
         if (i == 0) return fail(digits, "index 0, expected indices that count from 1");
         if (i < 0 && -i > have)
             return fail(digits, fmt::format("index {} is out of range, the file has {} {} before here", i, have,
                                             name_of(part)));
         if (i > have) forward_.push_back({digits, part, i});
-        index = static_cast<std::uint32_t>(i < 0 ? have + i : i - 1);
+        index =
+            static_cast<std::uint32_t>((i < 0 ? have + i : i - 1) + (is_plates_ && i < 0 && is_position ? 1 : 0));
         return true;
     }
 
@@ -157,8 +217,26 @@ private:
         return true;
     }
 
+    /// Finds out where the faces of a table of plates count from.
+    bool count_from_base() {
+        if (!check_forward_references()) return false;
+        PlateFaces faces;
+        for (const Polygon& polygon : polygons_)
+            for (std::size_t i = 1; i + 1 < polygon.count; ++i) {
+                const TriangleSoup::Corner* corner = &corners_[polygon.first];
+                faces.push_back({corner[0].position, corner[i].position, corner[i + 1].position});
+            }
+        const Result<std::uint32_t> base = plate_base(faces, soup_.positions, path_, soup_.warnings);
+        if (!base) {
+            error_ = base.error();
+            return false;
+        }
+        for (TriangleSoup::Corner& corner : corners_) corner.position -= *base;
+        return true;
+    }
+
     bool use_material(std::string_view keyword) {
-        material_ = material_number(std::string(in_.rest()));
+        material_ = material_number(material_name(in_.rest()));
         return names_.size() <= kMaxMaterials ||
                fail(keyword, fmt::format("more than {} materials", kMaxMaterials));
     }
@@ -186,45 +264,10 @@ private:
     }
 
     bool read_materials() {
-        std::map<std::string, MeshMaterial> known;
-        for (const std::string& library : libraries_)
-            if (!read_library(library, known)) return false;
-        std::string missing;
-        for (const std::string& name : names_) {
-            const auto it = known.find(name);
-            if (it == known.end() && name != kNoMaterial)
-                missing += (missing.empty() ? "\"" : ", \"") + name + "\"";
-            soup_.materials.push_back(it != known.end() ? it->second : MeshMaterial{.material = {.name = name}});
-        }
-        if (!missing.empty())
-            soup_.warnings.push_back(
-                fmt::format("{}: in none of its material files: {}; grey 0.5 is used", path_, missing));
-        return true;
+        const Status read = read_obj_materials(path_, libraries_, names_, soup_);
+        if (!read) error_ = read.error();
+        return read.has_value();
     }
-
-    /// `mtllib` names one file, perhaps with spaces in it, or several.
-    bool read_library(const std::string& names, std::map<std::string, MeshMaterial>& known) {
-        std::error_code problem;
-        if (std::filesystem::exists(beside(names), problem)) return read_library_file(names, known);
-        TextCursor words(names, path_);
-        words.next_line();
-        for (std::string_view name = words.token(); !name.empty(); name = words.token()) {
-            if (std::filesystem::exists(beside(name), problem)) {
-                if (!read_library_file(name, known)) return false;
-            } else {
-                soup_.warnings.push_back(fmt::format("{}: its material file {} is not there", path_, name));
-            }
-        }
-        return true;
-    }
-
-    bool read_library_file(std::string_view name, std::map<std::string, MeshMaterial>& known) {
-        Status status = read_mtl(beside(name), known, soup_.warnings);
-        if (!status) error_ = status.error();
-        return status.has_value();
-    }
-
-    [[nodiscard]] std::string beside(std::string_view name) const { return texture_path(path_, std::string(name)); }
 
     TextCursor in_;
     const std::string& path_;
@@ -235,6 +278,10 @@ private:
     std::vector<std::string> libraries_, names_;
     std::map<std::string, std::uint16_t> numbers_;
     std::optional<std::uint16_t> material_;
+    std::vector<std::uint32_t> colour_of_;  ///< of the positions, while there are colours
+    std::set<std::string> unused_;
+    bool is_plates_, is_smooth_ = false, has_odd_vertices_ = false;
+    static constexpr std::array<std::string_view, 3> kFlat{"off", "0", ""};
     std::optional<Error> error_;
 };
 
@@ -243,7 +290,10 @@ private:
 Result<TriangleSoup> read_obj(const std::string& path) {
     Result<std::string> text = read_file(path);
     if (!text) return text.error();
-    return ObjReader(std::move(*text), path).read();
+    const bool has_painted_comments = text->find("\n#MRGB") != std::string::npos;
+    Result<TriangleSoup> soup = ObjReader(std::move(*text), path).read();
+    if (soup && has_painted_comments) soup->warnings.push_back(path + ": colours in comments (#MRGB) are not used");
+    return soup;
 }
 
 }  // namespace narpa

@@ -29,23 +29,23 @@ constexpr std::array<Column, kColumns - 1> kNumbers{
      {&CatalogueStar::pm_ra_mas_yr, "a proper motion of at most 1e6 mas a year, or nothing", -1e6, 1e6, true},
      {&CatalogueStar::pm_dec_mas_yr, "a proper motion of at most 1e6 mas a year, or nothing", -1e6, 1e6, true}}};
 
-Result<CatalogueStar> read_line(std::string_view line, const std::string& file, int number) {
-    const auto bad = [&](std::string_view at, std::string what) {
-        return Error{std::move(what), file, number, static_cast<int>(at.data() - line.data()) + 1};
+Result<CatalogueStar> read_row(const CsvRow& row, const std::string& file) {
+    const auto bad = [&](std::string_view cell, std::string what) {
+        return Error{std::move(what), file, row.number, row.column_of(cell)};
     };
-    const std::vector<std::string_view> cells = cells_of(line);
+    const std::vector<std::string_view>& cells = row.cells;
     if (cells.size() != kColumns)
-        return bad(line, fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kStarHeader));
+        return bad(cells.front(), fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kStarHeader));
     CatalogueStar star;
-    star.name = trimmed(cells[0]);
+    star.name = cells[0];
     for (std::size_t i = 0; i < kNumbers.size(); ++i) {
         const Column& column = kNumbers[i];
-        const std::string_view cell = trimmed(cells[i + 1]);
+        const std::string_view cell = cells[i + 1];
         if (cell.empty() && column.may_be_empty) continue;
-        double value = 0;
-        if (!read_number(cell, value) || !(value >= column.low && value <= column.high))
+        const std::optional<double> value = row.number_in(cell);
+        if (!value || !(*value >= column.low && *value <= column.high))
             return bad(cell, fmt::format("\"{}\" where {} was expected", cell, column.expected));
-        star.*column.value = value;
+        star.*column.value = *value;
     }
     return star;
 }
@@ -54,13 +54,13 @@ Result<CatalogueStar> read_line(std::string_view line, const std::string& file, 
 
 Result<std::vector<CatalogueStar>> read_star_catalogue(const std::string& file) {
     std::vector<CatalogueStar> stars;
-    const auto take = [&](std::string_view line, int number) -> Status {
-        auto star = read_line(line, file, number);
+    const auto take = [&](const CsvRow& row) -> Status {
+        auto star = read_row(row, file);
         if (!star) return star.error();
         stars.push_back(*std::move(star));
         return Ok{};
     };
-    if (auto read = read_csv_lines(file, kStarHeader, "a star catalogue", "star", take); !read) return read.error();
+    if (auto read = read_csv_rows(file, kStarHeader, "a star catalogue", "star", take); !read) return read.error();
     return stars;
 }
 

@@ -9,6 +9,11 @@
 #include "renderer/material/texture_lookup.h"
 
 namespace narpa {
+
+double linear_from_srgb(double s) {
+    return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+}
+
 namespace {
 
 using Colour = TextureUse::Colour;
@@ -24,11 +29,6 @@ Table table_of(std::uint32_t largest, Curve linear) {
         table.push_back(
             static_cast<std::uint16_t>(std::lround(65535.0 * linear(code / static_cast<double>(largest)))));
     return table;
-}
-
-/// IEC 61966-2-1.
-double linear_from_srgb(double s) {
-    return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
 }
 
 double from_middle_at_128(double s) {

@@ -36,4 +36,7 @@ Result<Texture> read_texture(const std::string& path, const TextureUse& use = {}
 Result<Texture> decode_texture(const std::string& name, std::span<const std::uint8_t> bytes,
                                const TextureUse& use = {}, std::vector<std::string>* warnings = nullptr);
 
+/// A code of sRGB (IEC 61966-2-1), 0 to 1, as linear light.
+[[nodiscard]] double linear_from_srgb(double code);
+
 }  // namespace narpa

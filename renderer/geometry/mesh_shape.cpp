@@ -15,6 +15,8 @@ Status check_mesh(const Scene& scene, const Mesh& mesh) {
         return bad(std::to_string(mesh.normals.size()) + " normals for " + std::to_string(n) + " vertices");
     if (!mesh.uvs.empty() && mesh.uvs.size() != n)
         return bad(std::to_string(mesh.uvs.size()) + " texture coordinates for " + std::to_string(n) + " vertices");
+    if (!mesh.colours.empty() && mesh.colours.size() != n)
+        return bad(std::to_string(mesh.colours.size()) + " colours for " + std::to_string(n) + " vertices");
     if (mesh.face_material.size() != mesh.faces.size())
         return bad(std::to_string(mesh.face_material.size()) + " materials for " +
                    std::to_string(mesh.faces.size()) + " faces");

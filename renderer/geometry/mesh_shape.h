@@ -47,6 +47,7 @@ public:
         lift(points, wanted, starts);
     }
     [[nodiscard]] TextureFrame texture_frame(const Hit& hit) const noexcept override;
+    [[nodiscard]] Rgb vertex_colour(std::uint32_t face, const Vec3& position_body) const noexcept override;
     [[nodiscard]] std::span<const BoxNode> boxes() const override;
     [[nodiscard]] std::unique_ptr<const EmissiveSurface> emission(const Scene& scene) const override {
         return mesh_emission(scene, mesh_);

@@ -1,4 +1,6 @@
 // The surface of a mesh at hits: position, normals, texture coordinates, and the starts of rays that leave.
+#include <algorithm>
+
 #include "base/each_isa.h"
 #include "renderer/geometry/mesh_shape.h"
 
@@ -98,6 +100,21 @@ TextureFrame MeshShape::texture_frame(const Hit& hit) const noexcept {
     const Vec3 e1 = t.b - t.a, e2 = t.c - t.a;
     const TextureFrame frame{inverse_det * (w2 * e1 - w1 * e2), inverse_det * (u1 * e2 - u2 * e1)};
     return is_finite(frame.dp_du) && is_finite(frame.dp_dv) ? frame : TextureFrame{};  // no area in the texture
+}
+
+Rgb MeshShape::vertex_colour(std::uint32_t face, const Vec3& position_body) const noexcept {
+    if (mesh_.colours.empty()) return {1, 1, 1};
+    const Triangle t = triangle(face);
+    const Vec3 e1 = t.b - t.a, e2 = t.c - t.a, p = position_body - t.a;
+    const double e11 = dot(e1, e1), e12 = dot(e1, e2), e22 = dot(e2, e2), p1 = dot(p, e1), p2 = dot(p, e2),
+                 inverse_det = 1 / (e11 * e22 - e12 * e12);
+    const double b1 = std::clamp(inverse_det * (e22 * p1 - e12 * p2), 0.0, 1.0),
+                 b2 = std::clamp(inverse_det * (e11 * p2 - e12 * p1), 0.0, 1 - b1);
+    const auto& corner = mesh_.faces[face];
+    const Rgb colour = static_cast<float>(1 - b1 - b2) * mesh_.colours[corner[0]] +
+                       static_cast<float>(b1) * mesh_.colours[corner[1]] +
+                       static_cast<float>(b2) * mesh_.colours[corner[2]];
+    return is_finite(colour) ? colour : mesh_.colours[corner[0]];
 }
 
 }  // namespace narpa

@@ -140,6 +140,10 @@ public:
     }
     /// In the body's frame.
     [[nodiscard]] virtual TextureFrame texture_frame(const Hit& hit) const noexcept = 0;
+    /// Mesh::colours at a hit, linear between the corners; white without.
+    [[nodiscard]] virtual Rgb vertex_colour(std::uint32_t /*face*/, const Vec3& /*position_body*/) const noexcept {
+        return {1, 1, 1};
+    }
     /// A tree of boxes whose leaves hold the surface, root first; empty: the ellipsoid of `bounds` fits it best.
     /// Built at the first call, by any thread, and cached.
     [[nodiscard]] virtual std::span<const BoxNode> boxes() const { return {}; }

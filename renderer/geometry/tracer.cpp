@@ -81,6 +81,12 @@ TextureFrame Tracer::texture_frame(const BodyPoses& at, const Hit& hit) const no
     return {q * du, q * dv};
 }
 
+Rgb Tracer::vertex_colour(const BodyPoses& at, const Hit& hit) const noexcept {
+    const auto body = static_cast<std::size_t>(hit.body);
+    const Rigid3 T = at.T_world_body_at(body, hit.time);
+    return shape(body).vertex_colour(hit.face, conjugate(T.q) * (hit.position - T.t));
+}
+
 const Shape& Tracer::shape(std::size_t body) const noexcept {
     return *impl_->shapes[body];
 }

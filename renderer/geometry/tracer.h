@@ -59,6 +59,8 @@ public:
 
     /// In world axes.
     [[nodiscard]] TextureFrame texture_frame(const BodyPoses& at, const Hit& hit) const noexcept;
+    /// Shape::vertex_colour.
+    [[nodiscard]] Rgb vertex_colour(const BodyPoses& at, const Hit& hit) const noexcept;
 
     [[nodiscard]] const Shape& shape(std::size_t body) const noexcept;
     /// An ellipsoid that holds the body.

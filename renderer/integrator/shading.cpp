@@ -126,9 +126,10 @@ Vec3 towards_viewer(const Vec3& n, const Vec3& v, const Vec3& geometric) {
 
 void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction,
                     double width_m, Surface& s) noexcept {
-    if (!std::isfinite(hit.u) || !std::isfinite(hit.v)) return;
     const Scene& scene = tracer.scene();
     const Material& m = *s.material;
+    if (m.vertex_colours >= 0) s.diffuse = s.diffuse * tracer.vertex_colour(at, hit);
+    if (!std::isfinite(hit.u) || !std::isfinite(hit.v)) return;
     const auto texture = [&](int index) {
         return index < 0 ? nullptr : &scene.textures[static_cast<std::size_t>(index)];
     };

@@ -6,8 +6,8 @@
 
 namespace narpa {
 
-/// Multiplies the material's colours by their textures at the hit, covers them with its clouds and turns the normal
-/// by its normal and height maps.
+/// Multiplies the material's colours by the vertex colours and their textures at the hit, covers them with its
+/// clouds and turns the normal by its normal and height maps.
 void apply_textures(const Tracer& tracer, const BodyPoses& at, const Hit& hit, const Vec3& ray_direction,
                     double width_m, Surface& surface) noexcept;
 

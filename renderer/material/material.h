@@ -72,16 +72,19 @@ struct Material {
     int height_texture = -1;  ///< bumps: height in metres = bump_height_m * mean of rgb
     float normal_scale = 1;
     float bump_height_m = 0;
+    int vertex_colours = -1;     ///< 0: Mesh::colours multiply `diffuse`; -1 is none
     float retroreflectance = 0;  ///< towards a LiDAR, added to the kind's; relative to a white diffuse surface
 };
 
-/// True if there are textures besides that of `diffuse`.
+/// True if there are textures besides that of `diffuse`, or vertex colours.
 [[nodiscard]] inline bool has_more_than_colour(const Material& m) noexcept {
-    return m.emission_texture >= 0 || m.specular_texture >= 0 || m.cloud_texture >= 0 || m.normal_texture >= 0 ||
-           m.height_texture >= 0;
+    // The sign bit is set where all are -1: one jump, as this is asked at each hit.
+    return (m.emission_texture & m.specular_texture & m.cloud_texture & m.normal_texture & m.height_texture &
+            m.vertex_colours) >= 0;
 }
 [[nodiscard]] inline bool is_textured(const Material& m) noexcept {
-    return m.texture >= 0 || has_more_than_colour(m);
+    return (m.texture & m.emission_texture & m.specular_texture & m.cloud_texture & m.normal_texture &
+            m.height_texture & m.vertex_colours) >= 0;
 }
 /// True if the emission varies over the surface.
 [[nodiscard]] inline bool has_emission_map(const Material& m) noexcept {

@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
-#include <exception>
 #include <iterator>
 #include <sstream>
 
-#include "base/file_bytes.h"
-#include "renderer/mesh_reader/assimp_reader.h"
+#include "renderer/mesh_reader/mesh_reader.h"
 
 namespace narpa {
 
@@ -25,19 +23,29 @@ public:
                         fmt::format("{} materials, at most {} can be used", scene_.mNumMaterials, kMaxMaterials)};
         for (unsigned i = 0; i < scene_.mNumMaterials; ++i)
             materials_.push_back(from_assimp(scene_, *scene_.mMaterials[i], path_, soup_.warnings));
-        if (materials_.empty()) materials_.push_back({.numbers = {.diffuse = {0.5f, 0.5f, 0.5f}}, .name = {}});
-        warn_of_lost_textures();
+        if (materials_.empty()) materials_.push_back(grey_material());
         if (scene_.mRootNode) read_node(*scene_.mRootNode, aiMatrix4x4t<double>());
+        tell_unused();
         return {.error = problem_, .soup = std::move(soup_), .materials = std::move(materials_)};
     }
 
 private:
-    /// Assimp 5.2 ignores this extension, and the textures with it, without a warning.
-    void warn_of_lost_textures() {
-        if (const std::string kind = extension_of(path_); kind != ".gltf" && kind != ".glb") return;
-        const Result<std::string> bytes = read_file(path_);
-        if (bytes && bytes->find("\"EXT_texture_webp\"") != std::string::npos)
-            soup_.warnings.push_back(path_ + ": its textures (EXT_texture_webp) cannot be read and are not used");
+    void warn(std::string_view what) { soup_.warnings.push_back(fmt::format("{}: {}", path_, what)); }
+
+    void tell_unused() {
+        const auto any = [&](auto has) {
+            return std::any_of(scene_.mMeshes, scene_.mMeshes + scene_.mNumMeshes, has);
+        };
+        if (scene_.mNumAnimations > 0) warn("animations are not used: nodes are as they are stored");
+        if (any([](const aiMesh* m) { return m->HasBones(); }))
+            warn("skins are not used: meshes are as they are stored");
+        if (any([](const aiMesh* m) { return m->mNumAnimMeshes > 0; })) warn("morph targets are not used");
+        if (any([](const aiMesh* m) {
+                return (m->mPrimitiveTypes & (aiPrimitiveType_POINT | aiPrimitiveType_LINE)) != 0;
+            }))
+            warn("points and lines are not used");
+        if (any([](const aiMesh* m) { return m->GetNumColorChannels() > 1; }))
+            warn("second colours of vertices are not used");
     }
 
     void read_node(const aiNode& node, const aiMatrix4x4t<double>& parent) {
@@ -58,12 +66,17 @@ private:
         const auto first_position = static_cast<std::uint32_t>(soup_.positions.size());
         const auto first_normal = static_cast<std::uint32_t>(soup_.normals.size());
         const auto first_uv = static_cast<std::uint32_t>(soup_.uvs.size());
-        const bool has_uv = part.HasTextureCoords(0);
+        const auto first_colour = static_cast<std::uint32_t>(soup_.colours.size());
+        const bool has_uv = part.HasTextureCoords(0), has_colours = part.HasVertexColors(0);
         for (unsigned i = 0; i < part.mNumVertices; ++i) {
             const aiVector3D& p = part.mVertices[i];
             const aiVector3t<double> w = T * aiVector3t<double>(p.x, p.y, p.z);
             soup_.positions.push_back({w.x, w.y, w.z});
             if (has_uv) soup_.uvs.push_back({part.mTextureCoords[0][i].x, part.mTextureCoords[0][i].y});
+            if (has_colours) {
+                const aiColor4D& c = part.mColors[0][i];
+                soup_.colours.push_back({c.r, c.g, c.b});
+            }
         }
         if (part.HasNormals()) read_normals(part, T);
         const bool mirrored = aiMatrix3x3t<double>(T).Determinant() < 0;
@@ -72,6 +85,7 @@ private:
             TriangleSoup::Corner c{.position = first_position + v};
             if (has_uv) c.uv = first_uv + v;
             if (part.HasNormals()) c.normal = first_normal + v;
+            if (has_colours) c.colour = first_colour + v;
             return c;
         };
         for (unsigned f = 0; f < part.mNumFaces; ++f)
@@ -131,19 +145,12 @@ void keep_importer_of(const std::string& path, Assimp::Importer& importer) {
 }  // namespace
 
 MeshMessage read_with_assimp(const std::string& path) {
-    const auto cannot = [](std::string_view why) {
-        return MeshMessage{.error = fmt::format("not a mesh that can be read: {}", why)};
-    };
-    try {
-        if (const Status ply = extension_of(path) == ".ply" ? check_ply(path) : Ok{}; !ply)
-            return {.error = ply.error().what, .line = ply.error().line, .column = ply.error().column};
-        Assimp::Importer importer;
-        keep_importer_of(path, importer);
-        const aiScene* scene = importer.ReadFile(path, 0);
-        return scene ? Walk(*scene, path).read() : cannot(importer.GetErrorString());
-    } catch (const std::exception& e) {
-        return cannot(e.what());
-    }
+    Assimp::Importer importer;
+    keep_importer_of(path, importer);
+    const aiScene* scene = importer.ReadFile(path, 0);
+    if (scene == nullptr)
+        return {.error = fmt::format("not a mesh that can be read: {}", importer.GetErrorString())};
+    return Walk(*scene, path).read();
 }
 
 }  // namespace narpa

@@ -34,8 +34,9 @@ struct Mesh {
     std::vector<std::array<float, 2>> uvs;            ///< per vertex, or empty; v up, (0, 0) is the bottom left
     std::vector<std::array<std::uint32_t, 3>> faces;  ///< counter-clockwise seen from outside
     std::vector<std::uint16_t> face_material;         ///< per face, index into Scene::materials
-    Vec3 origin_m{};                                  ///< of the positions, in the body's frame
-    bool height_field = false;                        ///< a terrain: counts as open, whatever its edges
+    std::vector<Rgb> colours{};  ///< per vertex, linear, for Material::vertex_colours; or empty
+    Vec3 origin_m{};             ///< of the positions, in the body's frame
+    bool height_field = false;   ///< a terrain: counts as open, whatever its edges
 };
 
 /// A shape in the body's own frame that is not made of triangles. Kinds: renderer/geometry/shape_kind.h.

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/constants.h"
 #include "base/csv.h"
-#include "base/read_number.h"
 #include "protocols/lidar/pattern_lidar.h"
 #include "renderer/keys/toml_file.h"
 
@@ -181,24 +181,24 @@ std::vector<PatternShot> read_spin(TableReader table) {
 Result<std::vector<PatternShot>> read_shots(const std::string& file) {
     constexpr std::string_view kHeader = "phase,azimuth_deg,elevation_deg,beam";
     std::vector<PatternShot> shots;
-    const auto take = [&](std::string_view line, int number) -> Status {
+    const auto take = [&](const CsvRow& row) -> Status {
+        constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
         std::array<double, 4> x{};
-        const auto cells = cells_of(line);
-        bool good = cells.size() == x.size() && shots.size() < LidarPattern::kMaxShots;
-        for (std::size_t i = 0; good && i < x.size(); ++i) good = read_number(trimmed(cells[i]), x[i]);
+        bool good = row.cells.size() == x.size() && shots.size() < LidarPattern::kMaxShots;
+        for (std::size_t i = 0; good && i < x.size(); ++i) x[i] = row.number_in(row.cells[i]).value_or(kNone);
         good = good && kPhase.holds(x[0]) && kAzimuth_deg.holds(x[1]) && kElevation_deg.holds(x[2]) && x[3] >= 0 &&
                x[3] <= 65535 && x[3] == std::floor(x[3]);
         if (!good)
             return Error{fmt::format("expected {}: phase in [0, 1), angles within 720 and 90 deg, a beam of 0 to "
                                      "65535; at most {} rows",
                                      kHeader, LidarPattern::kMaxShots),
-                         file, number, 1};
+                         file, row.number, 1};
         if (!shots.empty() && x[0] < shots.back().phase)
-            return Error{"fires before the shot above it, expected the order of firing", file, number, 1};
+            return Error{"fires before the shot above it, expected the order of firing", file, row.number, 1};
         shots.push_back({kRadPerDeg * x[1], kRadPerDeg * x[2], x[0], static_cast<int>(x[3])});
         return Ok{};
     };
-    if (Status read = read_csv_lines(file, kHeader, "shots of a LiDAR", "shot", take); !read) return read.error();
+    if (Status read = read_csv_rows(file, kHeader, "shots of a LiDAR", "shot", take); !read) return read.error();
     return shots;
 }
 

@@ -65,6 +65,7 @@ private:
 
     int add_mesh(Mesh mesh, int material) {
         mesh.face_material.assign(mesh.faces.size(), static_cast<std::uint16_t>(material));
+        mesh.colours = {};
         r_.scene.meshes.push_back(std::move(mesh));
         return static_cast<int>(r_.scene.meshes.size()) - 1;
     }

@@ -38,7 +38,7 @@ const Asset kAssets[] = {
     {"testmeshes/spot/spot_quadrangulated.obj", 1, 5856, 0, {}, 1e9},
     {"testmeshes/common/stanford-bunny.obj", 1, 69451, 0, {0.156, 0.154, 0.121}, 0.001},
     {"spacecraft/astrobee_dock/meshes/dock.dae", 1, 25798, 0, {}, 1e9},
-    {"spacecraft/hubble/hubble.glb", 1, 19332, 0, {11.07, 16.73, 12.36}, 0.01},
+    {"spacecraft/hubble/hubble.glb", 1, 19332, 5, {11.07, 16.73, 12.36}, 0.01},
     {"smallbody/castalia/4769castalia.tab", 1000, 4092, 0, {}, 1e9},
 };
 

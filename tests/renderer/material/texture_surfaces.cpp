@@ -295,6 +295,41 @@ TEST(Surface, WithoutTexturesIsTheMaterial) {
     EXPECT_EQ(surface_at(*tracer, placed(s), hit, ray.direction, 1).specular, (Rgb{0.1f, 0.2f, 0.3f}));
 }
 
+TEST(Surface, VertexColoursAreLinearBetweenTheCorners) {
+    Scene s;
+    Material m = lambert(0.5f);
+    m.vertex_colours = 0;
+    s.materials = {m, lambert(0.5f)};
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {2, 2, 0}};
+    mesh.faces = {{0, 1, 2}, {1, 3, 2}};
+    mesh.face_material = {0, 1};
+    mesh.colours = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}};
+    const Rigid3 T{exp_rotation({0.1, -0.2, 0.3}), {100, 200, 300}};
+    add_mesh(s, mesh, T);
+    const auto tracer = Tracer::create(s, 1);
+    ASSERT_TRUE(tracer) << tracer.error().text();
+    const BodyPoses at = placed(s);
+    const auto albedo = [&](double b1, double b2) {
+        const Ray ray{T * Vec3{2 * b1, 2 * b2, 5}, T.q * Vec3{0, 0, -1}};
+        const Hit hit = tracer->intersect(at, ray, kInfinity);
+        EXPECT_EQ(hit.body, 0);
+        return surface_at(*tracer, at, hit, ray.direction, 0).diffuse;
+    };
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> part(0.01, 0.49);
+    for (int i = 0; i < 100; ++i) {
+        const double b1 = part(random), b2 = part(random);
+        const Rgb c = albedo(b1, b2);
+        EXPECT_NEAR(c.x, 0.5 * (1 - b1 - b2), 1e-6);
+        EXPECT_NEAR(c.y, 0.5 * b1, 1e-6);
+        EXPECT_NEAR(c.z, 0.5 * b2, 1e-6);
+    }
+    EXPECT_EQ(albedo(0.9, 0.9), (Rgb{0.5f, 0.5f, 0.5f})) << "the material without";
+    s.meshes[0].colours.pop_back();
+    EXPECT_FALSE(Tracer::create(s, 1));
+}
+
 TEST(Surface, EmissionTextureMultipliesWhatShines) {
     Scene s;
     Material m = lambert(0.5f);

@@ -1,22 +1,25 @@
-/// renderer/assets/text_cursor.h - a line-based text file (OBJ, MTL) read token by token, with places for errors.
+/// base/text_cursor.h - a line-based text file (OBJ, MTL) read token by token, with places for errors.
 #pragma once
 
 #include <algorithm>
-#include <charconv>
-#include <limits>
-#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "base/result.h"
+#include "base/text_lines.h"
+#include "base/text_number.h"
 
 namespace narpa {
 
-/// Walks over a text's lines and their tokens. A line that ends in a backslash goes on in the next one.
+/// Walks over a text's lines and their tokens. A line that ends in a backslash goes on in the next one, unless a
+/// comment ends it, or the next line begins with a keyword.
 class TextCursor {
 public:
-    TextCursor(std::string text, std::string file) : text_(std::move(text)), file_(std::move(file)) {
-        join_continued_lines();
+    TextCursor(std::string text, std::string file, std::span<const std::string_view> keywords = {})
+        : text_(plain_lines(std::move(text))), file_(std::move(file)) {
+        join_continued_lines(keywords);
         at_ = end_ = text_.data() - 1;
     }
     TextCursor(const TextCursor&) = delete;
@@ -37,6 +40,11 @@ public:
         const char* from = at_;
         while (at_ < end_ && !is_space(*at_)) ++at_;
         return {from, static_cast<std::size_t>(at_ - from)};
+    }
+    /// Whether only spaces or a comment are left of this line.
+    [[nodiscard]] bool at_line_end() {
+        skip_space();
+        return at_ == end_ || *at_ == '#';
     }
     /// What is left of the line, without the spaces around it.
     std::string_view rest() {
@@ -65,29 +73,30 @@ private:
     void skip_space() {
         while (at_ < end_ && is_space(*at_)) ++at_;
     }
-    void join_continued_lines() {
-        for (std::size_t i = text_.find('\\'); i != std::string::npos; i = text_.find('\\', i + 1)) {
-            std::size_t newline = i + 1;
-            if (newline < text_.size() && text_[newline] == '\r') ++newline;
-            if (newline < text_.size() && text_[newline] == '\n') text_[i] = ' ', text_[newline] = kContinued;
+
+    void join_continued_lines(std::span<const std::string_view> keywords) {
+        for (std::size_t i = text_.find("\\\n"); i != std::string::npos; i = text_.find("\\\n", i + 2)) {
+            if (has_comment(i) || std::ranges::find(keywords, word_at(i + 2)) != keywords.end()) continue;
+            text_[i] = ' ', text_[i + 1] = kContinued;
         }
+    }
+    /// Whether a comment begins in the line before `end`.
+    [[nodiscard]] bool has_comment(std::size_t end) const {
+        const std::size_t newline = end > 0 ? text_.rfind('\n', end - 1) : std::string::npos,
+                          start = newline == std::string::npos ? 0 : newline + 1;
+        for (std::size_t i = text_.find('#', start); i < end; i = text_.find('#', i + 1))
+            if (i == start || is_space(text_[i - 1])) return true;
+        return false;
+    }
+    [[nodiscard]] std::string_view word_at(std::size_t i) const {
+        const char *from = text_.data() + i, *last = text_.data() + text_.size();
+        while (from < last && is_space(*from)) ++from;
+        const char* to = std::find_if(from, last, [](char c) { return is_space(c) || c == '\n'; });
+        return {from, static_cast<std::size_t>(to - from)};
     }
 
     std::string text_, file_;
     const char *at_ = nullptr, *end_ = nullptr;
 };
-
-/// The number that a token is, NaN and infinity included; nullopt when it is none.
-inline std::optional<double> number_from(std::string_view token) {
-    if (token.size() > 1 && token[0] == '+' && token[1] != '-') token.remove_prefix(1);
-    double x = 0;
-    const auto [end, problem] = std::from_chars(token.data(), token.data() + token.size(), x);
-    if (end != token.data() + token.size() || token.empty()) return std::nullopt;
-    if (problem == std::errc::result_out_of_range)  // either way; an exponent below zero has a minus sign
-        return token.find("e-") == token.npos && token.find("E-") == token.npos
-                   ? std::numeric_limits<double>::infinity()
-                   : 0.0;
-    return problem == std::errc() ? std::optional(x) : std::nullopt;
-}
 
 }  // namespace narpa

@@ -1,0 +1,240 @@
+// Meshes of PLY files: vertices with normals, texture coordinates and colours; faces and strips.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "renderer/assets/mesh_readers.h"
+#include "renderer/mesh_reader/mesh_reader.h"
+#include "renderer/mesh_reader/ply_file.h"
+
+namespace narpa {
+namespace {
+
+/// Indices of properties that belong together; -1: absent.
+template <std::size_t N>
+using Columns = std::array<int, N>;
+
+template <std::size_t N>
+bool has(const Columns<N>& columns) {
+    return std::ranges::all_of(columns, [](int i) { return i >= 0; });
+}
+
+double value(const PlyValues& values, int column) {
+    const std::vector<double>& v = values[static_cast<std::size_t>(column)];
+    return v.empty() ? 0 : v[0];
+}
+
+/// Colours of vertices or of faces. Codes of 8 bits are sRGB; those of 16 bits and fractions are linear.
+class Colours {
+public:
+    Colours() = default;
+    explicit Colours(const PlyElement& element)
+        : columns_{element.find({"red", "diffuse_red", "r"}), element.find({"green", "diffuse_green", "g"}),
+                   element.find({"blue", "diffuse_blue", "b"})} {
+        if (has(columns_)) type_ = element.properties[static_cast<std::size_t>(columns_[0])].type;
+    }
+    [[nodiscard]] bool given() const { return type_ != nullptr; }
+    [[nodiscard]] const Columns<3>& columns() const { return columns_; }
+    [[nodiscard]] Rgb read(const PlyValues& values) const {
+        return {static_cast<float>(value(values, columns_[0])), static_cast<float>(value(values, columns_[1])),
+                static_cast<float>(value(values, columns_[2]))};
+    }
+    /// From the file's codes to linear light. Fractions above 2 are codes of 8 bits.
+    void finish(std::vector<Rgb>& colours) const {
+        const bool are_codes =
+            type_->largest == 255 || (type_->largest == 1 && std::ranges::any_of(colours, [](const Rgb& c) {
+                                          return std::max({c.x, c.y, c.z}) > 2;
+                                      }));
+        for (Rgb& c : colours) c = are_codes ? linear_colour(c / 255.0f) : c / static_cast<float>(type_->largest);
+    }
+
+private:
+    Columns<3> columns_{-1, -1, -1};
+    const PlyType* type_ = nullptr;
+};
+
+class PlyReader {
+public:
+    PlyReader(PlyFile& file, const std::string& path) : file_(file), path_(path) {}
+
+    MeshMessage read() {
+        for (const PlyElement& element : file_.elements)
+            if (Status read = read_element(element); !read)
+                return {.error = read.error().what, .line = read.error().line, .column = read.error().column};
+        if (!faces_have_colours_ && vertex_colours_.given()) vertex_colours_.finish(soup_.colours);
+        if (faces_have_colours_) face_colours_.finish(soup_.colours);
+        PlainMaterial material = grey_material();
+        if (!file_.textures.empty()) {
+            material.colour.file = texture_path(path_, file_.textures[0]);
+            material.numbers.diffuse = {1, 1, 1};
+            material.numbers.is_grey_by_default = false;
+        }
+        if (file_.textures.size() > 1)
+            warn(fmt::format("of its {} textures only the first is used", file_.textures.size()));
+        tell_unused();
+        return {.soup = std::move(soup_), .materials = {std::move(material)}};
+    }
+
+private:
+    void warn(std::string_view what) { soup_.warnings.push_back(fmt::format("{}: {}", path_, what)); }
+
+    void tell_unused() {
+        std::string all;
+        for (const std::string& name : unused_) all += (all.empty() ? "" : ", ") + name;
+        if (!all.empty()) warn("elements and properties that are not used: " + all);
+    }
+    template <std::size_t N>
+    void mark(const Columns<N>& columns) {
+        for (const int i : columns) used_.insert(i);
+    }
+    void note_unused(const PlyElement& element) {
+        for (std::size_t i = 0; i < element.properties.size(); ++i)
+            if (const std::string& name = element.properties[i].name;
+                !used_.contains(static_cast<int>(i)) && name != "alpha")
+                unused_.insert(element.name + "." + name);
+        used_.clear();
+    }
+
+    Status read_element(const PlyElement& element) {
+        if (element.name == "vertex") return read_vertices(element);
+        if (element.name == "face" || element.name == "tristrips") return read_faces(element);
+        if (element.count > 0) unused_.insert(element.name);
+        PlyValues values;
+        for (std::size_t i = 0; static_cast<double>(i) < element.count; ++i)
+            if (Status read = file_.read(element, i, values); !read) return read;
+        return Ok{};
+    }
+
+    Status read_vertices(const PlyElement& e) {
+        const Columns<3> position{e.find({"x"}), e.find({"y"}), e.find({"z"})},
+            normal{e.find({"nx", "normal_x"}), e.find({"ny", "normal_y"}), e.find({"nz", "normal_z"})};
+        const Columns<2> uv{e.find({"s", "u", "texture_u", "tx"}), e.find({"t", "v", "texture_v", "ty"})};
+        if (!has(position)) return file_.error("its vertices have no x, y and z");
+        vertex_colours_ = Colours(e);
+        mark(position), mark(normal), mark(uv), mark(vertex_colours_.columns());
+        note_unused(e);
+        PlyValues v;
+        for (std::size_t i = 0; static_cast<double>(i) < e.count; ++i) {
+            if (Status read = file_.read(e, i, v); !read) return read;
+            soup_.positions.push_back({value(v, position[0]), value(v, position[1]), value(v, position[2])});
+            if (has(normal))
+                soup_.normals.push_back({static_cast<float>(value(v, normal[0])),
+                                         static_cast<float>(value(v, normal[1])),
+                                         static_cast<float>(value(v, normal[2]))});
+            if (has(uv))
+                soup_.uvs.push_back({static_cast<float>(value(v, uv[0])), static_cast<float>(value(v, uv[1]))});
+            if (vertex_colours_.given()) soup_.colours.push_back(vertex_colours_.read(v));
+        }
+        has_vertex_normals_ = has(normal), has_vertex_uvs_ = has(uv);
+        return Ok{};
+    }
+
+    Status read_faces(const PlyElement& e) {
+        const int list = e.find({"vertex_indices", "vertex_index"});
+        const bool is_strips = e.name == "tristrips";
+        if (list < 0) return file_.error(fmt::format("its {} have no vertex_indices", e.name));
+        const int wedge = is_strips ? -1 : e.find({"texcoord"});
+        const Colours colours(e);
+        if (colours.given() && vertex_colours_.given() && e.count > 0)
+            warn("colours of faces are not used, as its vertices have some");
+        else if (colours.given())
+            face_colours_ = colours, faces_have_colours_ = true;
+        mark(Columns<3>{list, wedge, e.find({"texnumber"})}), mark(colours.columns());
+        note_unused(e);
+        PlyValues v;
+        for (std::size_t i = 0; static_cast<double>(i) < e.count; ++i) {
+            if (Status read = file_.read(e, i, v); !read) return read;
+            const std::uint32_t colour = colour_of(colours, v);
+            const std::vector<double>& corners = v[static_cast<std::size_t>(list)];
+            Status added =
+                is_strips
+                    ? add_strips(corners, colour)
+                    : add_face(corners, wedge < 0 ? std::vector<double>{} : v[static_cast<std::size_t>(wedge)],
+                               colour);
+            if (!added) return added;
+        }
+        return Ok{};
+    }
+
+    std::uint32_t colour_of(const Colours& colours, const PlyValues& values) {
+        if (!colours.given() || !faces_have_colours_) return TriangleSoup::kNone;
+        soup_.colours.push_back(colours.read(values));
+        return static_cast<std::uint32_t>(soup_.colours.size() - 1);
+    }
+
+    /// `colour`: the face's.
+    TriangleSoup::Corner corner(double index, std::uint32_t colour) const {
+        const auto i = static_cast<std::uint32_t>(index);
+        TriangleSoup::Corner c{.position = i, .colour = colour};
+        if (has_vertex_uvs_) c.uv = i;
+        if (has_vertex_normals_) c.normal = i;
+        if (vertex_colours_.given()) c.colour = i;
+        return c;
+    }
+    Status check(const std::vector<double>& corners) const {
+        const auto size = static_cast<double>(soup_.positions.size());
+        for (const double i : corners)
+            if (!(i >= 0 && i < size) || i != std::floor(i))
+                return file_.error(fmt::format("a face has vertex {}, counted from 0, of {}", i, size));
+        if (corners.size() > kMaxCorners)
+            return file_.error(
+                fmt::format("a face of {} corners, expected at most {}", corners.size(), kMaxCorners));
+        return Ok{};
+    }
+
+    Status add_face(const std::vector<double>& corners, const std::vector<double>& uvs, std::uint32_t colour) {
+        if (Status good = check(corners); !good) return good;
+        const auto first_uv = static_cast<std::uint32_t>(soup_.uvs.size());
+        const bool has_uvs = !uvs.empty() && uvs.size() == 2 * corners.size();
+        for (std::size_t k = 0; has_uvs && k < corners.size(); ++k)
+            soup_.uvs.push_back({static_cast<float>(uvs[2 * k]), static_cast<float>(uvs[2 * k + 1])});
+        std::vector<Vec3> points;
+        for (const double i : corners) points.push_back(soup_.positions[static_cast<std::size_t>(i)]);
+        for (const auto& t : triangulate(points)) {
+            TriangleSoup::Triangle out{.corners = {}};
+            for (std::size_t k = 0; k < 3; ++k) {
+                out.corners[k] = corner(corners[t[k]], colour);
+                if (has_uvs) out.corners[k].uv = first_uv + t[k];
+            }
+            soup_.triangles.push_back(out);
+        }
+        return Ok{};
+    }
+
+    /// Strips are separated by -1.
+    Status add_strips(const std::vector<double>& all, std::uint32_t colour) {
+        for (auto from = all.begin(); from != all.end();) {
+            const auto end = std::find(from, all.end(), -1.0);
+            const auto n = static_cast<std::size_t>(end - from);
+            for (std::size_t i = 0; i + 2 < n; ++i) {
+                const auto at = [&](std::size_t k) { return from[static_cast<std::ptrdiff_t>(k)]; };
+                const std::vector<double> corners{at(i), at(i + 1 + i % 2), at(i + 2 - i % 2)};
+                if (Status good = check(corners); !good) return good;
+                soup_.triangles.push_back(
+                    {{corner(corners[0], colour), corner(corners[1], colour), corner(corners[2], colour)}});
+            }
+            from = end == all.end() ? end : end + 1;
+        }
+        return Ok{};
+    }
+
+    PlyFile& file_;
+    const std::string& path_;
+    TriangleSoup soup_;
+    Colours vertex_colours_, face_colours_;
+    bool faces_have_colours_ = false, has_vertex_normals_ = false, has_vertex_uvs_ = false;
+    std::set<int> used_;
+    std::set<std::string> unused_;
+};
+
+}  // namespace
+
+MeshMessage read_ply(const std::string& path) {
+    Result<PlyFile> file = PlyFile::open(path);
+    if (!file) return {.error = file.error().what, .line = file.error().line, .column = file.error().column};
+    return PlyReader(*file, path).read();
+}
+
+}  // namespace narpa

@@ -10,15 +10,14 @@
 #include "apps/cli.h"
 #include "apps/scene_options.h"
 #include "apps/shipped.h"
+#include "apps/sweep_file.h"
 #include "base/write_file.h"
-#include "drivers/lidar/packet_source.h"
 #include "emulator/replay/replay.h"
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"
 #include "estimator/search/cloud_search.h"
 #include "estimator/view/measured_image.h"
-#include "protocols/lidar/lidar_model.h"
 #include "tracking/estimate_report.h"
 
 namespace narpa::cli {
@@ -37,6 +36,7 @@ struct EstimateOptions {
     // `no_truth`, the guess is the truth displaced.
     std::string frame, sweep;  ///< an image or FILE.raw; FILE.pcap
     double time_s = 0;
+    std::string unit;          ///< of the sweep's capture; empty: it holds packets of one
     double range_noise_m = 0;  ///< of the sweep, standard deviation; 0: the scene's
     bool no_truth = false;     ///< the poses are a guess
     PoseOptions pose;
@@ -166,27 +166,6 @@ nlohmann::json show(const Estimated& of, const Rigid3& T, const Matrix6& covaria
     return document;
 }
 
-/// One turn from the capture's first packet on; times count from its first shot.
-Result<LidarSweep> sweep_in(const std::string& path, const Lidar& lidar) {
-    const LidarSpec& spec = lidar.model->spec();
-    auto datagrams = read_datagrams(path, spec.data_packet_bytes);
-    if (!datagrams) return datagrams.error();
-    LidarSweep sweep;
-    SweepReader reader(*lidar.model);
-    std::optional<std::int64_t> first_ns;
-    for (const auto& bytes : *datagrams) {
-        const auto time_ns = lidar.model->packet_time(bytes, first_ns.value_or(0));
-        if (!time_ns) continue;
-        if (!first_ns) first_ns = time_ns;
-        const std::int64_t after_ns = *time_ns - *first_ns;
-        if (after_ns < 0 || static_cast<double>(after_ns) >= 1e9 / lidar.model->spec().rate_hz) break;
-        reader.append(bytes, after_ns, sweep);
-    }
-    if (!first_ns)
-        return Error{fmt::format("holds no data packet of a {}, expected at least one", spec.name), path};
-    return sweep;
-}
-
 /// Removes the points on the body that carries the LiDAR, whose place is known, and the beams without return that
 /// meet it.
 void remove_own_body(LidarSweep& sweep, const World& world, const Lidar& lidar, const BodyPoses& at) {
@@ -279,11 +258,13 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     const Lidar& lidar = scene.lidars[*index];
     auto target = target_of(**world, lidar.mount, lidar.name, tracker.target);
     if (!target) return target.error();
-    auto sweep = sweep_in(o.sweep, lidar);
-    if (!sweep) return sweep.error();
+    auto captured = read_sweep(o.sweep, *lidar.model, o.unit);
+    if (!captured) return captured.error();
+    for (const std::string& warning : captured->warnings) say("warning: " + warning);
+    LidarSweep& sweep = captured->sweep;
     BodyPoses then(scene.bodies.size());
     (*world)->place(t_ns, lidar.mount, then);
-    remove_own_body(*sweep, **world, lidar, then);
+    remove_own_body(sweep, **world, lidar, then);
     const auto T_lidar_target_at = [&](std::int64_t t) {
         BodyPoses at(scene.bodies.size());
         (*world)->place(t, lidar.mount, at);
@@ -307,9 +288,9 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
         const Progress progress("estimating the pose in " + o.sweep);
         const auto estimate = [&] {
             const Tracer& tracer = (*world)->tracer();
-            return tracker.search ? CloudSearch(tracer, *target, settings).find(sweep->points, motion, sweep->empty)
+            return tracker.search ? CloudSearch(tracer, *target, settings).find(sweep.points, motion, sweep.empty)
                                   : CloudIcp(tracer, *target, settings)
-                                        .align(sweep->points, motion, guess, search_m, sweep->empty);
+                                        .align(sweep.points, motion, guess, search_m, sweep.empty);
         };
         threads.arena.execute([&] { found.emplace(estimate()); });
     }
@@ -323,6 +304,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
         fmt::format("  {} returns (its own body's left out), {} used, {} as the model has them; {} motions that "
                     "cannot be seen; {} iterations",
                     e.points, e.used, e.explained, unobserved, e.iterations));
+    document["capture"] = to_json(*captured);
     document["empty"] = e.empty_beams.empty;
     document["points"] = e.points;
     document["used"] = e.used;
@@ -380,8 +362,12 @@ Command add_estimate(Parser app) {
          "A frame, also of a real camera: FILE.png, .tif or .pgm in the camera's size and format, or the bytes in "
          "FILE.raw")
         .type_name("FILE");
-    c.option("--sweep", o->sweep, "The LiDAR's data packets, from the first on for one turn")
+    c.option("--sweep", o->sweep, "The LiDAR's data packets, from the earliest on for one turn")
         .type_name("FILE.pcap");
+    c.option("--unit", o->unit,
+             "Source address and destination port of the packets to use, where the capture holds those of several "
+             "LiDARs")
+        .type_name("ADDRESS:PORT");
     c.option("--time", o->time_s, "Simulation time of the frame or the sweep's first shot")
         .type_name("SECONDS")
         .range(-9e9, 9e9);
@@ -401,10 +387,10 @@ Command add_estimate(Parser app) {
     c.option("-o,--output", o->picture, "Errors over time, with three standard deviations and bound")
         .type_name("FILE.png");
     for (const char* name :
-         {"--frame", "--sweep", "--time", "--range-noise", "--no-truth", "--pose", "--trajectory"})
+         {"--frame", "--sweep", "--time", "--unit", "--range-noise", "--no-truth", "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--method", "--frame-noise"}) o->only_of_frames.push_back(c.find(name));
-    o->only_of_sweeps.push_back(c.find("--range-noise"));
+    for (const char* name : {"--unit", "--range-noise"}) o->only_of_sweeps.push_back(c.find(name));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
     c.footer("Exit status 1 if no frame gave a pose, or that of a single frame or sweep is ambiguous or refused.");
     c.group("Results");

@@ -11,6 +11,7 @@
 #include "apps/cli.h"
 #include "apps/outputs.h"
 #include "apps/scene_options.h"
+#include "base/time.h"
 #include "base/write_file.h"
 #include "drivers/lidar/packet_sink.h"
 #include "emulator/lidar/lidar_unit.h"
@@ -113,6 +114,8 @@ Outcome scan(const ScanOptions& o) {
     const double duration_s =
         o.duration_s > 0 ? o.duration_s : 1 / (*world)->scene().lidars[*index].model->spec().rate_hz;
     const std::int64_t from_ns = std::llround(o.time_s * 1e9), to_ns = from_ns + std::llround(duration_s * 1e9);
+    if (extension == ".pcap" && (*world)->scene().epoch_unix_ns / kSecond_ns + to_ns / kSecond_ns > UINT32_MAX)
+        return Error{"the scan ends after 2105, and a capture has 32 bits for the seconds since 1970", o.out};
     if (auto loaded = o.pose.load(**world, from_ns, to_ns); !loaded) return loaded.error();
     if (auto made = make_folder_of(o.out); !made) return made.error();
     LidarUnit unit(**world, *index, extension == ".csv");

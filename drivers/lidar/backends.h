@@ -21,6 +21,8 @@ struct PacketSinkOptions {
 
 /// `address`: udp_route.h.
 PacketSinkResult open_udp_sink(const std::string& address, const PacketSinkOptions& o);
+/// The Error of programs without libpcap.
+[[nodiscard]] Error built_without_captures(const std::string& path);
 /// Writes the metadata, if there is any, to FILE.json beside the capture.
 PacketSinkResult open_pcap_sink(const std::string& path, const PacketSinkOptions& o);
 /// `address`: PORT or ADDRESS:PORT to listen at.

@@ -1,4 +1,4 @@
-/// drivers/lidar/packet_source.h - sources of LiDAR packets: a UDP port, a capture file.
+/// drivers/lidar/packet_source.h - sources of LiDAR packets: UDP ports. capture.h reads files.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "base/result.h"
 
@@ -38,9 +37,5 @@ inline constexpr std::size_t kDatagramBytesMax = 65507;
 /// SOURCE: `udp:PORT` (on all of this machine's addresses) | `udp:ADDRESS[%INTERFACE]:PORT` (an IPv6 address is in
 /// brackets); a multicast address is joined.
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec);
-
-/// The payloads of this size of all UDP datagrams over IPv4 and Ethernet, in the file's order; other traffic is
-/// skipped. Errors: not a capture, another link than Ethernet, a file cut short, none of that size.
-Result<std::vector<std::vector<std::uint8_t>>> read_datagrams(const std::string& path, std::size_t payload_bytes);
 
 }  // namespace narpa

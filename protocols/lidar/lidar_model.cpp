@@ -47,6 +47,10 @@ bool LidarField::contains(const Vec3& d) const noexcept {
     return false;
 }
 
+std::string LidarModel::mismatch(std::span<const std::uint8_t> bytes) const {
+    return packet_time(bytes, 0) ? "" : "damaged, or of another instrument or mode";
+}
+
 std::int64_t LidarModel::sweep(std::int64_t packet) const noexcept {
     return std::llround(std::floor(static_cast<double>(packet_start_ns(packet)) * 1e-9 * spec_.rate_hz));
 }

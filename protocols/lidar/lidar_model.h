@@ -193,6 +193,9 @@ public:
     /// `near_unix_ns`. Nothing: these bytes are not a data packet of this unit.
     [[nodiscard]] virtual std::optional<std::int64_t> packet_time(std::span<const std::uint8_t> bytes,
                                                                   std::int64_t near_unix_ns) const noexcept = 0;
+    /// Why these bytes are not a data packet of this unit: what they have, and what was expected; empty: they are
+    /// one. May allocate.
+    [[nodiscard]] virtual std::string mismatch(std::span<const std::uint8_t> bytes) const;
     /// Decodes a data packet's returns in firing order and returns their number; 0 where it is no data packet of
     /// this unit. `out` has spec().points_per_packet elements.
     virtual std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept = 0;

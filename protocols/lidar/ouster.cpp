@@ -13,7 +13,6 @@
 namespace narpa {
 namespace {
 
-constexpr int kPacketColumns = OusterFormat::kColumns;
 constexpr std::array<int, 3> kColumnsOfATurn{512, 1024, 2048};
 constexpr int kDesignBeams = 128;
 
@@ -85,6 +84,9 @@ Result<OusterMetadata> configured_unit(const LidarSettings& settings, int beams)
 
     if (unit.columns != columns_before || unit.pixel_shift_by_row.empty())
         unit.pixel_shift_by_row = pixel_shifts(unit);
+    if (unit.columns % unit.columns_per_packet != 0)
+        return Error{.what = "columns_per_packet of the metadata is " + std::to_string(unit.columns_per_packet) +
+                             ", expected a divisor of the columns of a turn, " + std::to_string(unit.columns)};
     if (unit.column_window[1] < 0) unit.column_window = {0, unit.columns - 1};
     if (columns_before > 0 && columns_before != unit.columns)
         unit.column_window = {unit.column_window[0] * unit.columns / columns_before,
@@ -107,13 +109,22 @@ public:
                               .vertical = std::sin(unit_.altitude_deg[i] * kRadPerDeg)});
     }
 
+    [[nodiscard]] std::int64_t packet_start_ns(std::int64_t packet) const noexcept override {
+        return packet / packets_a_turn() * turn_ns() + measurement_ns(measurement_of(packet, 0));
+    }
+    [[nodiscard]] std::int64_t first_packet_from(std::int64_t t_ns) const noexcept override {
+        std::int64_t packet = t_ns / turn_ns() * packets_a_turn() + t_ns % turn_ns() * packets_a_turn() / turn_ns();
+        while (packet_start_ns(packet) < t_ns) ++packet;
+        return packet;
+    }
+
     void shots(std::int64_t packet, std::span<LidarShot> out) const noexcept override {
         for (std::size_t i = 0; i < out.size(); ++i) {
             const int column = static_cast<int>(i / beams_.size()), measurement = measurement_of(packet, column);
             const std::size_t beam = i % beams_.size();
             LidarShot& shot = out[i];
             shot = along(beam, measurement);
-            shot.t_offset_ns = column_offset_ns(column);
+            shot.t_offset_ns = column_offset_ns(packet, column);
             shot.block = column;
             shot.fires = fires(measurement);
         }
@@ -127,12 +138,12 @@ public:
             OusterHeader{
                 .frame_id = frame_id, .init_id = unit_.init_id, .serial = unit_.serial(), .rest = {}, .footer = {}},
             out);
-        for (int c = 0; c < kPacketColumns; ++c) {
+        for (int c = 0; c < format_.columns(); ++c) {
             const int measurement = measurement_of(packet, c);
             const bool valid = fires(measurement);
             format_.put(
                 OusterColumn{.t_ns = static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet) +
-                                                                column_offset_ns(c)),
+                                                                column_offset_ns(packet, c)),
                              .measurement_id = static_cast<std::uint16_t>(measurement),
                              .frame_id = frame_id,
                              .encoder = OusterColumn::kEncoderTurn / static_cast<std::uint32_t>(unit_.columns) *
@@ -147,7 +158,7 @@ public:
 
     std::optional<std::int64_t> packet_time(std::span<const std::uint8_t> bytes,
                                             std::int64_t) const noexcept override {
-        if (!is_ours(bytes)) return std::nullopt;
+        if (mismatch_of(bytes) != Mismatch::none) return std::nullopt;
         return static_cast<std::int64_t>(format_.column(bytes, 0).t_ns);
     }
 
@@ -179,15 +190,35 @@ public:
         return count;
     }
 
+    std::string mismatch(std::span<const std::uint8_t> bytes) const override {
+        const auto differs = [](const char* what, std::uint64_t found, std::uint64_t expected) {
+            return what + (" " + std::to_string(found)) + " in the packets, " + std::to_string(expected) +
+                   " in the sensor's metadata";
+        };
+        switch (mismatch_of(bytes)) {
+            case Mismatch::none: break;
+            case Mismatch::size:
+                return std::to_string(bytes.size()) + " bytes, expected " + std::to_string(format_.bytes());
+            case Mismatch::type: return "packet type " + std::to_string(format_.header(bytes).packet_type);
+            case Mismatch::init_id: return differs("init id", format_.header(bytes).init_id, unit_.init_id);
+            case Mismatch::serial: return differs("serial number", format_.header(bytes).serial, unit_.serial());
+            case Mismatch::columns:
+                return "measurement ids that are not those of " + std::to_string(format_.columns()) +
+                       " successive columns of " + std::to_string(unit_.columns);
+            case Mismatch::times: return "column times that are not within one turn";
+        }
+        return {};
+    }
+
     std::string metadata() const override { return write_ouster_metadata(unit_); }
 
 private:
     /// Calls use(shot's number, beam, pixel, axis) for the shots of the packet's valid columns, in firing order.
     template <class Use>
     void each_pixel(std::span<const std::uint8_t> bytes, const Use& use) const noexcept {
-        if (!is_ours(bytes)) return;
+        if (mismatch_of(bytes) != Mismatch::none) return;
         const std::uint64_t start_ns = format_.column(bytes, 0).t_ns;
-        for (int c = 0; c < kPacketColumns; ++c) {
+        for (int c = 0; c < format_.columns(); ++c) {
             const OusterColumn column = format_.column(bytes, c);
             if (!format_.is_valid(column)) continue;
             for (std::size_t beam = 0; beam < beams_.size(); ++beam) {
@@ -205,12 +236,12 @@ private:
     };
 
     static OusterFormat format_of(const OusterMetadata& unit) {
-        return {profile_of(unit), static_cast<int>(unit.altitude_deg.size())};
+        return {profile_of(unit), static_cast<int>(unit.altitude_deg.size()), unit.columns_per_packet};
     }
 
     static LidarSpec spec_of(std::string_view name, const OusterMetadata& unit) {
         const OusterFormat format = format_of(unit);
-        const std::size_t shots = kPacketColumns * unit.altitude_deg.size();
+        const std::size_t shots = static_cast<std::size_t>(format.columns()) * unit.altitude_deg.size();
         const bool dual = format.profile() == OusterProfile::dual;
         LidarNetwork network = kOusterNetwork;
         network.data_port = unit.port_lidar;
@@ -218,7 +249,7 @@ private:
         return {.name = name,
                 .rate_hz = static_cast<double>(unit.rate_hz),
                 .returns = dual ? LidarReturns::strongest_two : LidarReturns::strongest,
-                .packet_period_ns = kSecond_ns / unit.rate_hz / (unit.columns / kPacketColumns),
+                .packet_period_ns = kSecond_ns / unit.rate_hz / (unit.columns / format.columns()),
                 .shots_per_packet = shots,
                 .points_per_packet = dual ? 2 * shots : shots,
                 .data_packet_bytes = format.bytes(),
@@ -228,15 +259,22 @@ private:
                 .network = network};
     }
 
-    [[nodiscard]] int packets_a_turn() const noexcept { return unit_.columns / kPacketColumns; }
+    [[nodiscard]] int packets_a_turn() const noexcept { return unit_.columns / format_.columns(); }
     [[nodiscard]] int measurement_of(std::int64_t packet, int column) const noexcept {
-        return static_cast<int>(packet % packets_a_turn()) * kPacketColumns + column;
+        return static_cast<int>(packet % packets_a_turn()) * format_.columns() + column;
     }
-    [[nodiscard]] std::int64_t column_offset_ns(int column) const noexcept {
-        return column * spec().packet_period_ns / kPacketColumns;
+    /// After the start of its turn.
+    [[nodiscard]] std::int64_t measurement_ns(int measurement) const noexcept {
+        return measurement * turn_ns() / unit_.columns;
+    }
+    [[nodiscard]] std::int64_t turn_ns() const noexcept { return kSecond_ns / unit_.rate_hz; }
+    [[nodiscard]] std::int64_t column_offset_ns(std::int64_t packet, int column) const noexcept {
+        return measurement_ns(measurement_of(packet, column)) - measurement_ns(measurement_of(packet, 0));
     }
     [[nodiscard]] bool fires(int measurement) const noexcept {
-        return measurement >= unit_.column_window[0] && measurement <= unit_.column_window[1];
+        const auto [first, last] = unit_.column_window;
+        return first <= last ? measurement >= first && measurement <= last
+                             : measurement >= first || measurement <= last;
     }
     [[nodiscard]] double origin_to_beam_m() const noexcept { return 1e-3 * unit_.origin_to_beam_mm(); }
 
@@ -286,26 +324,28 @@ private:
                 .near_ir = to_photons(kNearIrOfSunlitWhite * static_cast<double>(echoes.sunlight))};
     }
 
-    /// True for packets of this unit whose columns are in order, with times within one turn.
-    [[nodiscard]] bool is_ours(std::span<const std::uint8_t> bytes) const noexcept {
-        if (bytes.size() != format_.bytes()) return false;
+    enum class Mismatch : std::uint8_t { none, size, type, init_id, serial, columns, times };
+
+    /// `none` for packets of this unit whose columns are in order, with times within one turn.
+    [[nodiscard]] Mismatch mismatch_of(std::span<const std::uint8_t> bytes) const noexcept {
+        if (bytes.size() != format_.bytes()) return Mismatch::size;
         if (format_.profile() != OusterProfile::legacy) {
             const OusterHeader header = format_.header(bytes);
-            if (header.packet_type != OusterHeader::kLidar || header.init_id != unit_.init_id ||
-                header.serial != unit_.serial())
-                return false;
+            if (header.packet_type != OusterHeader::kLidar) return Mismatch::type;
+            if (unit_.states_init_id && header.init_id != unit_.init_id) return Mismatch::init_id;
+            if (unit_.states_serial && header.serial != unit_.serial()) return Mismatch::serial;
         }
         const OusterColumn first = format_.column(bytes, 0);
-        if (first.measurement_id % kPacketColumns != 0 || first.measurement_id >= unit_.columns ||
-            first.t_ns >> 63 != 0)
-            return false;
-        for (int c = 1; c < kPacketColumns; ++c) {
+        if (first.measurement_id % format_.columns() != 0 || first.measurement_id >= unit_.columns)
+            return Mismatch::columns;
+        if (first.t_ns >> 63 != 0) return Mismatch::times;
+        for (int c = 1; c < format_.columns(); ++c) {
             const OusterColumn column = format_.column(bytes, c);
-            if (column.measurement_id != first.measurement_id + c) return false;
+            if (column.measurement_id != first.measurement_id + c) return Mismatch::columns;
             // Unsigned: a time before the first one's is far above.
-            if (column.t_ns - first.t_ns > static_cast<std::uint64_t>(kSecond_ns / unit_.rate_hz)) return false;
+            if (column.t_ns - first.t_ns > static_cast<std::uint64_t>(turn_ns())) return Mismatch::times;
         }
-        return true;
+        return Mismatch::none;
     }
 
     OusterMetadata unit_;

@@ -3,7 +3,8 @@
 /// Frame: the maker's sensor frame, a quarter of a turn about z: x right, y forward (the maker's x), z up; the
 /// origin is the centre of the sensor's base. All beams of a column fire at once; a turn of 512, 1024 or 2048
 /// columns starts with column 0, which points along the maker's lidar x axis, backwards, at whole turns of
-/// simulation time. It turns clockwise seen from above. A packet has 16 columns, each with its own time: UTC in ns
+/// simulation time. It turns clockwise seen from above. A packet has 16 columns, or as many as the metadata
+/// state, each with its own time: UTC in ns
 /// since 1970, as from PTP.
 ///
 /// A ray starts where the beam leaves the rotor (`beam_to_lidar_transform`), and its range counts from there. The

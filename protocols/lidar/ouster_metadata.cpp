@@ -127,6 +127,23 @@ void read_beams(const MetadataReader& file, OusterMetadata& out) {
         out.beam_to_lidar[3] = MetadataReader::number_of("lidar_origin_to_beam_origin_mm", *n, kMax_mm);
 }
 
+/// Columns of a packet, and a check of the beams.
+void read_packing(const MetadataReader& file, OusterMetadata& out) {
+    constexpr std::size_t kDatagramBytesMax = 65507;
+    file.integer("columns_per_packet", 1, kMaxColumns, out.columns_per_packet);
+    const bool divides = out.columns == 0 || out.columns % out.columns_per_packet == 0;
+    const auto profile = std::ranges::find(kOusterProfiles, out.profile.empty() ? kOusterProfiles[1] : out.profile);
+    const OusterFormat format(static_cast<OusterProfile>(profile - kOusterProfiles.begin()),
+                              static_cast<int>(out.altitude_deg.size()), out.columns_per_packet);
+    if (!divides || format.bytes() > kDatagramBytesMax)
+        throw MetadataFault{"columns_per_packet", "a divisor of the columns of a turn, in packets of at most " +
+                                                      std::to_string(kDatagramBytesMax) + " bytes"};
+    std::size_t beams = out.altitude_deg.size();
+    file.integer("pixels_per_column", 1, kMaxColumns, beams);
+    if (beams != out.altitude_deg.size())
+        throw MetadataFault{"pixels_per_column", "the number of beam_altitude_angles"};
+}
+
 void read_format(const MetadataReader& file, OusterMetadata& out) {
     read_mode(file, out);
     file.integer("columns_per_frame", 1, kMaxColumns, out.columns);
@@ -135,11 +152,12 @@ void read_format(const MetadataReader& file, OusterMetadata& out) {
         throw MetadataFault{"udp_profile_lidar",
                             std::string(kOusterProfiles[0]) + ", " + std::string(kOusterProfiles[1]) + ", " +
                                 std::string(kOusterProfiles[2]) + " or " + std::string(kOusterProfiles[3])};
+    read_packing(file, out);
     std::vector<int> window;
     file.integers("column_window", 0, kMaxColumns - 1, window);
     if (!window.empty()) {
-        if (window.size() != 2 || window[0] > window[1] || window[1] >= out.columns)
-            throw MetadataFault{"column_window", "the first and the last column, in order and of those in a turn"};
+        if (window.size() != 2 || std::max(window[0], window[1]) >= out.columns)
+            throw MetadataFault{"column_window", "the first and the last column, each below the columns of a turn"};
         out.column_window = {window[0], window[1]};
     }
     file.integers("pixel_shift_by_row", -kMaxColumns, kMaxColumns, out.pixel_shift_by_row);
@@ -157,6 +175,8 @@ void read_identity(const MetadataReader& file, OusterMetadata& out) {
     file.text("build_rev", out.build_rev);
     file.text("build_date", out.build_date);
     file.integer("initialization_id", 0, 0xFF'FFFF, out.init_id);
+    out.states_init_id = file.find("initialization_id") != nullptr;
+    out.states_serial = file.find("prod_sn") != nullptr;
     constexpr std::size_t kMaxDigits = 12;  // packets have 40 bits for it
     if (out.prod_sn.size() > kMaxDigits ||
         !std::ranges::all_of(out.prod_sn, [](char c) { return c >= '0' && c <= '9'; }))
@@ -216,7 +236,7 @@ std::string write_ouster_metadata(const OusterMetadata& m) {
                         {"calibration_status", calibration},
                         {"config_params",
                          {{"azimuth_window", {0, 360'000}},
-                          {"columns_per_packet", OusterFormat::kColumns},
+                          {"columns_per_packet", m.columns_per_packet},
                           {"lidar_mode", std::to_string(m.columns) + "x" + std::to_string(m.rate_hz)},
                           {"operating_mode", "NORMAL"},
                           {"signal_multiplier", 1},
@@ -230,7 +250,7 @@ std::string write_ouster_metadata(const OusterMetadata& m) {
                         {"lidar_data_format",
                          {{"column_window", m.column_window},
                           {"columns_per_frame", m.columns},
-                          {"columns_per_packet", OusterFormat::kColumns},
+                          {"columns_per_packet", m.columns_per_packet},
                           {"pixel_shift_by_row", m.pixel_shift_by_row},
                           {"pixels_per_column", m.altitude_deg.size()},
                           {"udp_profile_imu", "LEGACY"},

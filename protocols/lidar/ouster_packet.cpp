@@ -123,7 +123,7 @@ std::size_t OusterFormat::pixel_at(int column, int beam) const noexcept {
 }
 
 std::size_t OusterFormat::bytes() const noexcept {
-    return column_at(kColumns) + layout_of(profile_).footer_bytes;
+    return column_at(columns_) + layout_of(profile_).footer_bytes;
 }
 
 std::uint32_t OusterFormat::range_mm_max() const noexcept {

@@ -1,8 +1,8 @@
 /// protocols/lidar/ouster_packet.h - the lidar packets of Ouster's sensors, field by field, in each profile.
 ///
-/// A packet has 16 columns, which are the shots of all beams at one instant. Any packet that is read field by field
-/// and written again is the same byte for byte, unused bits included. Source: Ouster, Firmware User Manual, "Lidar
-/// Data Packet Format"; README.md has the offsets.
+/// A packet has 16 columns, or as many as the metadata state, which are the shots of all beams at one instant. Any
+/// packet that is read field by field and written again is the same byte for byte, unused bits included. Source:
+/// Ouster, Firmware User Manual, "Lidar Data Packet Format"; README.md has the offsets.
 #pragma once
 
 #include <array>
@@ -57,19 +57,21 @@ struct OusterPixel {
 /// Reads and writes packets of one profile from a sensor with this number of beams.
 class OusterFormat {
 public:
-    static constexpr int kColumns = 16;
+    static constexpr int kColumns = 16;  ///< of a packet, as delivered
 
-    OusterFormat(OusterProfile profile, int beams) noexcept : profile_(profile), beams_(beams) {}
+    OusterFormat(OusterProfile profile, int beams, int columns = kColumns) noexcept
+        : profile_(profile), beams_(beams), columns_(columns) {}
 
     [[nodiscard]] OusterProfile profile() const noexcept { return profile_; }
+    [[nodiscard]] int columns() const noexcept { return columns_; }
     [[nodiscard]] std::size_t bytes() const noexcept;
     [[nodiscard]] std::uint32_t range_mm_max() const noexcept;
     [[nodiscard]] std::uint32_t range_step_mm() const noexcept;
     [[nodiscard]] bool is_valid(const OusterColumn& column) const noexcept;
     [[nodiscard]] std::uint32_t valid_status() const noexcept;
 
-    /// All spans have bytes(); columns are counted from 0 to kColumns - 1, beams from 0. Values that a field cannot
-    /// hold lose their high bits. LEGACY has no header.
+    /// All spans have bytes(); columns are counted from 0 to columns() - 1, beams from 0. Values that a field
+    /// cannot hold lose their high bits. LEGACY has no header.
     [[nodiscard]] OusterHeader header(std::span<const std::uint8_t> packet) const noexcept;
     [[nodiscard]] OusterColumn column(std::span<const std::uint8_t> packet, int column) const noexcept;
     [[nodiscard]] OusterPixel pixel(std::span<const std::uint8_t> packet, int column, int beam) const noexcept;
@@ -82,7 +84,7 @@ private:
     [[nodiscard]] std::size_t pixel_at(int column, int beam) const noexcept;
 
     OusterProfile profile_;
-    int beams_;
+    int beams_, columns_;
 };
 
 }  // namespace narpa

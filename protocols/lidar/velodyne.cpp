@@ -19,6 +19,7 @@ constexpr int kBlocks = VelodynePacket::kBlocks, kShotsPerBlock = VelodynePacket
 constexpr std::uint8_t kNoReflectivity = 255;  // without a return; README.md, "Data packet"
 constexpr double kRangeQuantumM = 0.002, kRangeMaxM = 65535 * kRangeQuantumM;
 constexpr std::int64_t kHour_ns = 3600 * kSecond_ns;
+constexpr double kRotorMost_hz = 25;  // the makes' 20 and a margin
 
 // Position packet: unused, time stamp, PPS state, unused, NMEA sentence and zeros (VLP-16 manual, section 9.3.3).
 constexpr std::size_t kPositionTimeOffset = 198, kPpsOffset = kPositionTimeOffset + 4,
@@ -96,6 +97,12 @@ std::uint16_t to_azimuth_cdeg(double revolutions) {
 std::uint16_t to_range_2mm(double range_m) {
     if (!(range_m > 0 && range_m <= kRangeMaxM)) return 0;  // NaN too
     return static_cast<std::uint16_t>(std::lround(range_m / kRangeQuantumM));
+}
+
+std::string hex(std::uint8_t value) {
+    std::array<char, 3> text{};
+    std::snprintf(text.data(), text.size(), "%02X", unsigned{value});
+    return text.data();
 }
 
 std::uint32_t past_hour_us(std::int64_t unix_ns) {
@@ -204,10 +211,23 @@ public:
         return near_unix_ns + off_ns;
     }
 
+    std::string mismatch(std::span<const std::uint8_t> bytes) const override {
+        if (bytes.size() != VelodynePacket::kBytes)
+            return std::to_string(bytes.size()) + " bytes, expected " + std::to_string(VelodynePacket::kBytes);
+        const auto packet = VelodynePacket::read(bytes);
+        if (!packet) return "a block's flag, an azimuth or a return mode that no packet has";
+        if (packet->product != product_.code)
+            return "product " + hex(packet->product) + ", expected " + hex(product_.code);
+        if (!read(bytes))
+            return "return mode " + hex(packet->mode) + ", expected " + hex(mode()) + ", as the scene has it";
+        return {};
+    }
+
     /// As the manual computes them: precision azimuth (section 9.5) and vertical correction applied.
     std::size_t points(std::span<const std::uint8_t> bytes, std::span<LidarPoint> out) const noexcept override {
         const auto packet = read(bytes);
         if (!packet) return 0;
+        const Turns turns = turns_of(*packet);
         std::size_t count = 0;
         const int echoes = dual_ ? 2 : 1;
         for (int i = 0; i < kBlocks / echoes * kShotsPerBlock; ++i)
@@ -216,7 +236,7 @@ public:
                 const VelodynePacket::Return& r = packet->blocks[block].returns[in_block];
                 if (r.range_2mm == 0) continue;
                 if (echo == 1 && r == packet->blocks[block - 1].returns[in_block]) continue;  // the same echo
-                const LidarAxis axis = axis_of(*packet, block, in_block);
+                const LidarAxis axis = axis_of(*packet, turns, block, in_block);
                 const int laser = in_block % product_.lasers();
                 LidarPoint& point = out[count];
                 point = {};
@@ -236,13 +256,14 @@ public:
     std::size_t empty_shots(std::span<const std::uint8_t> bytes, std::span<LidarAxis> out) const noexcept override {
         const auto packet = read(bytes);
         if (!packet) return 0;
+        const Turns turns = turns_of(*packet);
         std::size_t count = 0;
         const int echoes = dual_ ? 2 : 1;
         for (int block = 0; block < kBlocks; block += echoes)
             for (int k = 0; k < kShotsPerBlock; ++k)
                 if (packet->blocks[block].returns[k].range_2mm == 0 &&
                     packet->blocks[block + echoes - 1].returns[k].range_2mm == 0)
-                    out[count++] = axis_of(*packet, block, k);
+                    out[count++] = axis_of(*packet, turns, block, k);
         return count;
     }
 
@@ -294,18 +315,21 @@ private:
         return {range_2mm, range_2mm == 0 ? kNoReflectivity : reflectivity_code(echo.reflectivity)};
     }
 
-    /// From this block's azimuth to that of the next firing; the last has no next and takes the gap before it.
-    [[nodiscard]] static int azimuth_gap_cdeg(const VelodynePacket& p, int block, int step) noexcept {
-        const int from = block + step < kBlocks ? block : block - step;
-        const int gap = p.blocks[from + step].azimuth_cdeg - p.blocks[from].azimuth_cdeg;
-        return gap < 0 ? gap + VelodynePacket::kAzimuthTurn : gap;
+    using Turns = std::array<int, kBlocks>;
+    [[nodiscard]] Turns turns_of(const VelodynePacket& p) const noexcept {
+        const auto turn_at = [&](double rate_hz) {
+            return static_cast<int>(std::lround(1e-9 * static_cast<double>(product_.block_period_ns()) * rate_hz *
+                                                VelodynePacket::kAzimuthTurn));
+        };
+        return p.turns_cdeg(dual_ ? 2 : 1, turn_at(spec().rate_hz), turn_at(kRotorMost_hz));
     }
 
-    [[nodiscard]] LidarAxis axis_of(const VelodynePacket& p, int block, int in_block) const noexcept {
+    [[nodiscard]] LidarAxis axis_of(const VelodynePacket& p, const Turns& turns, int block,
+                                    int in_block) const noexcept {
         const int echoes = dual_ ? 2 : 1, laser = in_block % product_.lasers();
         const std::int64_t into_block_ns = product_.shot_offset_ns(in_block);
         const double turned = static_cast<double>(into_block_ns) / static_cast<double>(product_.block_period_ns());
-        const double azimuth_cdeg = p.blocks[block].azimuth_cdeg + azimuth_gap_cdeg(p, block, echoes) * turned;
+        const double azimuth_cdeg = p.blocks[block].azimuth_cdeg + turns[block] * turned;
         const LidarBeam& beam = settings_.beams[laser];
         return {.origin_m = {0, 0, beam.height_m},
                 .direction = direction(azimuth_cdeg * 0.01 * kRadPerDeg + beam.azimuth_rad, laser),

@@ -1,5 +1,8 @@
 #include "protocols/lidar/velodyne_packet.h"
 
+#include <algorithm>
+#include <cstdlib>
+
 #include "protocols/little_endian.h"
 
 namespace narpa {
@@ -9,7 +12,6 @@ constexpr std::size_t kReturnBytes = 2 + 1, kBlockBytes = 2 + 2 + VelodynePacket
 constexpr std::size_t kTimeOffset = VelodynePacket::kBlocks * kBlockBytes, kModeOffset = kTimeOffset + 4,
                       kProductOffset = kModeOffset + 1;
 static_assert(kProductOffset + 1 == VelodynePacket::kBytes);
-constexpr std::uint32_t kHour_us = 3'600'000'000u;
 
 }  // namespace
 
@@ -30,7 +32,7 @@ std::optional<VelodynePacket> VelodynePacket::read(std::span<const std::uint8_t>
     packet.past_hour_us = get_le<std::uint32_t>(&bytes[kTimeOffset]);
     packet.mode = bytes[kModeOffset];
     packet.product = bytes[kProductOffset];
-    if (packet.past_hour_us >= kHour_us || packet.mode < strongest || packet.mode > dual) return std::nullopt;
+    if (packet.mode < strongest || packet.mode > dual) return std::nullopt;
     return packet;
 }
 
@@ -50,6 +52,24 @@ void VelodynePacket::write(std::span<std::uint8_t, kBytes> bytes) const noexcept
     put_le(&bytes[kTimeOffset], past_hour_us);
     bytes[kModeOffset] = mode;
     bytes[kProductOffset] = product;
+}
+
+std::array<int, VelodynePacket::kBlocks> VelodynePacket::turns_cdeg(int step, int nominal_cdeg,
+                                                                    int most_cdeg) const noexcept {
+    std::array<int, kBlocks> turns{}, steady{};
+    std::size_t n = 0;
+    for (int b = 0; b < kBlocks; ++b) {
+        const int from = b + step < kBlocks ? b : b - step;
+        const int turn = blocks[from + step].azimuth_cdeg - blocks[from].azimuth_cdeg;
+        turns[b] = turn < 0 ? turn + kAzimuthTurn : turn;
+        if (turns[b] <= most_cdeg) steady[n++] = turns[b];
+    }
+    std::sort(steady.begin(), steady.begin() + n);
+    const int median = n == 0 ? nominal_cdeg : steady[n / 2];
+    constexpr int kRounding_cdeg = 2;
+    for (int& turn : turns)
+        if (turn > most_cdeg || std::abs(turn - median) > median / 2 + kRounding_cdeg) turn = median;
+    return turns;
 }
 
 }  // namespace narpa

@@ -29,13 +29,19 @@ struct VelodynePacket {
     };
 
     std::array<Block, kBlocks> blocks{};
-    std::uint32_t past_hour_us = 0;  ///< UTC of the first shot
+    /// UTC of the first shot. An hour or more is read too: units have been seen to count on over the full hour.
+    std::uint32_t past_hour_us = 0;
     std::uint8_t mode = strongest;
     std::uint8_t product = 0;
 
-    /// Nothing: length, block flag, azimuth, time or mode are not valid for such a packet.
+    /// Nothing: length, block flag, azimuth or mode are not valid for such a packet.
     [[nodiscard]] static std::optional<VelodynePacket> read(std::span<const std::uint8_t> bytes) noexcept;
     void write(std::span<std::uint8_t, kBytes> bytes) const noexcept;
+
+    /// By how much the rotor turns during each block, 0.01 deg: up to the block `step` further on, before it in the
+    /// last ones. Where azimuths jump, as where a limited field of view ends, or step back: the median of the
+    /// others; `nominal_cdeg` where there are none. `most_cdeg`: a larger turn is a jump.
+    [[nodiscard]] std::array<int, kBlocks> turns_cdeg(int step, int nominal_cdeg, int most_cdeg) const noexcept;
 };
 
 }  // namespace narpa

@@ -52,6 +52,6 @@ def decode(packet):
     return Packet(frame, first, shots, start_ns, flags & 1 == 1, points[records["range"] > 0])
 
 
-def read_pcap(path):
-    """Yields the decoded packets of a capture."""
-    return (decode(payload) for payload in pcap.udp_payloads(path) if payload[:4] == MAGIC)
+def read_pcap(path, unit=None):
+    """Yields the decoded packets of a capture. `unit`: pcap.packets()."""
+    return map(decode, pcap.packets(path, lambda payload: payload[:4] == MAGIC, unit))

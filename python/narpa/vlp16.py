@@ -14,6 +14,7 @@ BUFFER_BYTES, SO_RCVBUFFORCE = 4 << 20, 33  # asm-generic/socket.h; the socket m
 BLOCKS, LASERS = 12, 16
 LASER_PERIOD_S, SEQUENCE_PERIOD_S = 2.304e-6, 55.296e-6
 RANGE_STEP_M, AZIMUTH_STEP_DEG = 0.002, 0.01
+TURN_DEG, TURN_MOST_DEG = (360 * rate_hz * 2 * SEQUENCE_PERIOD_S for rate_hz in (10, 25))  # of the rotor during a block
 STRONGEST_RETURN, LAST_RETURN, VLP_16 = 0x37, 0x38, 0x22
 NO_REFLECTIVITY = 255  # value in the packet where there is no return
 ELEVATION_DEG = np.array([-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15], float)
@@ -41,6 +42,10 @@ def decode(packet):
     starts = blocks["azimuth_cdeg"] * AZIMUTH_STEP_DEG
     turns = np.diff(starts) % 360  # between blocks; the last block repeats the value before it
     turns = np.append(turns, turns[-1])
+    steady = np.sort(turns[turns <= TURN_MOST_DEG])
+    usual = steady[len(steady) // 2] if len(steady) else TURN_DEG
+    # Azimuths jump where a limited field of view ends, and may step back.
+    turns = np.where((turns > TURN_MOST_DEG) | (abs(turns - usual) > usual / 2 + 2 * AZIMUTH_STEP_DEG), usual, turns)
     sequence, laser = np.divmod(np.arange(32), LASERS)
     offset_s = sequence * SEQUENCE_PERIOD_S + laser * LASER_PERIOD_S
     azimuth_deg = starts[:, None] + turns[:, None] * offset_s / (2 * SEQUENCE_PERIOD_S)
@@ -88,6 +93,6 @@ def receive(port=PORT, host="", timeout_s=None):
                 yield packet
 
 
-def read_pcap(path):
-    """The data packets of a capture, as `--lidar LIDAR=FILE.pcap` and tcpdump write it."""
-    return (payload for payload in pcap.udp_payloads(path) if len(payload) == PACKET_BYTES)
+def read_pcap(path, unit=None):
+    """The data packets of a capture, as `--lidar LIDAR=FILE.pcap` and tcpdump write it. `unit`: pcap.packets()."""
+    return pcap.packets(path, lambda payload: len(payload) == PACKET_BYTES, unit)

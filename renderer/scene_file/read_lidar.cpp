@@ -5,6 +5,7 @@
 
 #include "base/constants.h"
 #include "base/file_bytes.h"
+#include "base/time.h"
 #include "protocols/lidar/lidar_model.h"
 #include "renderer/assets/lidar_calibration.h"
 #include "renderer/scene_file/lidar_description.h"
@@ -177,6 +178,11 @@ Lidar read_lidar(TableReader& table, std::vector<std::string>& names, Scene& sce
     const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);
     lidar.mount = mounting.mount;
     lidar.T_mount_lidar = mounting.T_mount_sensor;
+    // Up to where 32 bits of seconds since 1970 reach.
+    if (scene.epoch_unix_ns < 0 || scene.epoch_unix_ns / kSecond_ns > UINT32_MAX)
+        table.fail("model",
+                   "packets and captures are stamped in time since 1970: expected an epoch in [scene] of "
+                   "1970 to 2105");
     const LidarMake make = read_make(table, folder);
     lidar.model = make.configure(read_settings(table, make, folder, scene.warnings));
     const double range_m_most = lidar.model->spec().range_m_max;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/lidar/packet_source.h"
+#include "drivers/lidar/capture.h"
 #include "emulator/lidar/lidar_unit.h"
 #include "protocols/little_endian.h"
 #include "rehearsal/navigation/sensor_inputs.h"
@@ -144,12 +144,11 @@ TEST_F(JointLidar, PacketsOfALockstepRunDecodeToTheGeometry) {
     EXPECT_NE(lidar.to_text(true).find("fan.pcap: 4 written, 0 dropped"), std::string::npos) << lidar.to_text(true);
 
     // As navigation reads them: the turn that ends at 1.5 s, from the third packet.
-    const auto datagrams =
-        read_datagrams(folder_ / "fan.pcap", fan8().configure_default()->spec().data_packet_bytes);
-    ASSERT_TRUE(datagrams) << datagrams.error().text();
+    const auto capture = read_capture(folder_ / "fan.pcap");
+    ASSERT_TRUE(capture) << capture.error().text();
     const Scene& s = (*emulator)->world().scene();
     rehearsal::SweepBuffer buffer(s.lidars[0], s.epoch_unix_ns);
-    for (const auto& bytes : *datagrams) EXPECT_TRUE(buffer.take(bytes, 0));
+    for (const UdpDatagram& d : capture->datagrams) EXPECT_TRUE(buffer.take(d.payload, 0));
     EXPECT_FALSE(buffer.take(std::vector<std::uint8_t>(1206), 0));
     EXPECT_TRUE(buffer.complete_to(1'500'000'000));
     LidarSweep sweep;

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "drivers/lidar/packet_source.h"
+#include "drivers/lidar/capture.h"
 #include "tests/emulator/loop_support.h"
 
 namespace narpa::test {
@@ -38,8 +38,10 @@ TEST_F(SweepLogs, HaveARowForEachSweepWithTheChecksumOfItsPackets) {
     run("one", 1, false);
     EXPECT_FALSE(std::ifstream(folder_ / "one/top.shots.csv")) << "only where it is wanted";
     const Rows sweeps = read_rows(folder_ / "one/top.sweeps.csv");
-    const auto packets = read_datagrams(folder_ / "one.pcap", 1206);
-    ASSERT_TRUE(packets) << packets.error().text();
+    auto capture = read_capture(folder_ / "one.pcap");
+    ASSERT_TRUE(capture) << capture.error().text();
+    auto& packets = capture->datagrams;
+    std::erase_if(packets, [](const UdpDatagram& d) { return d.payload.size() != 1206; });
     ASSERT_EQ(sweeps.size(), 20U);
     constexpr std::int64_t kPacket_ns = 1'327'104, kSweep_ns = 100'000'000;
     std::size_t packet = 0;
@@ -49,8 +51,8 @@ TEST_F(SweepLogs, HaveARowForEachSweepWithTheChecksumOfItsPackets) {
         EXPECT_EQ(first_ns, static_cast<std::int64_t>(packet) * kPacket_ns);
         uLong crc = 0;
         for (std::int64_t i = 0; i < whole(row, "packets"); ++i, ++packet) {
-            ASSERT_LT(packet, packets->size());
-            crc = ::crc32(crc, (*packets)[packet].data(), 1206);
+            ASSERT_LT(packet, packets.size());
+            crc = ::crc32(crc, packets[packet].payload.data(), 1206);
         }
         EXPECT_EQ(whole(row, "packets_crc32"), static_cast<std::int64_t>(crc)) << sweep;
         EXPECT_EQ(whole(row, "shots"), 384 * whole(row, "packets"));
@@ -63,7 +65,7 @@ TEST_F(SweepLogs, HaveARowForEachSweepWithTheChecksumOfItsPackets) {
         EXPECT_EQ(whole(row, "packets_late") + whole(row, "packets_skipped") + whole(row, "packets_lost"), 0);
     }
     EXPECT_EQ(packet, packets_);
-    EXPECT_EQ(packet, packets->size());
+    EXPECT_EQ(packet, packets.size());
 }
 
 TEST_F(SweepLogs, AreTheSameOnAnyNumberOfThreads) {

@@ -257,7 +257,6 @@ TEST(Vlp16, DecodeRefusesWhatTheManualForbids) {
     EXPECT_FALSE(with(0, 0xFE));     // flag of the first block
     EXPECT_FALSE(with(1101, 0xDD));  // flag of the last block
     EXPECT_FALSE(with(3, 0x8D));     // azimuth of 361 deg
-    EXPECT_FALSE(with(1203, 0xFF));  // time stamp beyond the hour
     EXPECT_FALSE(with(1204, 0x39));  // dual returns, from a unit that has single ones
     EXPECT_FALSE(with(1204, 0x36));
     EXPECT_FALSE(with(1205, 0x21));  // HDL-32E

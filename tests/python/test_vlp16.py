@@ -85,6 +85,12 @@ class Packets(unittest.TestCase):
         packets = vlp16.receive(port, "127.0.0.1", timeout_s=0.2)
         self.assertEqual(list(packets), [])
 
+    def test_of_a_limited_field_of_view_spread_no_block_over_the_gap(self):
+        azimuths = np.arange(12) * 0.4 + np.where(np.arange(12) < 5, 88.6, 236.0)
+        points = vlp16.decode(vlp16.encode(azimuths, np.full((24, 16), 3.0)))
+        off = np.degrees(points["azimuth_rad"]).reshape(12, 32) - azimuths[:, None]
+        self.assertTrue((off >= -0.006).all() and (off < 0.4).all(), off)
+
     def test_are_read_from_captures(self):
         data = packet(np.full((24, 16), 3.0))
         udp = struct.pack(">4H", 2368, 2368, 8 + len(data), 0) + data

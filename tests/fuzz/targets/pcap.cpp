@@ -1,12 +1,16 @@
 // A capture of LiDAR packets.
-#include "drivers/lidar/packet_source.h"
+#include "drivers/lidar/capture.h"
 #include "tests/fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace narpa;
     static const fuzz::InputFolder folder;
-    const auto packets = read_datagrams(folder.write("m.pcap", fuzz::text_of(data, size)), 1206);
-    if (!fuzz::count(bool(packets))) return fuzz::require(!packets.error().what.empty(), "an error has words"), 0;
-    for (const auto& packet : *packets) fuzz::require(packet.size() == 1206, "packets have the size asked for");
+    const auto capture = read_capture(folder.write("m.pcap", fuzz::text_of(data, size)));
+    if (!fuzz::count(bool(capture))) return fuzz::require(!capture.error().what.empty(), "an error has words"), 0;
+    const CaptureCounters& c = capture->counters;
+    fuzz::require(capture->datagrams.size() + c.other + c.cut + c.malformed + c.repeated <= c.frames,
+                  "a frame is counted once");
+    for (std::size_t i = 1; i < capture->datagrams.size(); ++i)
+        fuzz::require(capture->datagrams[i - 1].t_ns <= capture->datagrams[i].t_ns, "datagrams are in order");
     return 0;
 }

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -55,12 +54,16 @@ struct PlateFit {
     }
 
 private:
-    /// Equal numbers for equal positions.
+    /// Equal numbers for positions that agree to 1e-6 of the extent: seams may differ in the last digit.
     static std::vector<std::uint32_t> points_of(const std::vector<Vec3>& positions) {
-        // Bit patterns also put NaN in order; -0 is 0.
-        const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x + 0.0); };
+        double extent = 0;
+        for (const Vec3& p : positions)
+            for (int k = 0; k < 3; ++k)
+                if (std::isfinite(p[k])) extent = std::max(extent, std::abs(p[k]));
+        const double step = extent > 0 ? 1e-6 * extent : 1;
+        const auto cell = [&](double x) { return std::isfinite(x) ? std::llround(x / step) : 0; };
         const auto key = [&](std::uint32_t v) {
-            return std::array{bits(positions[v].x), bits(positions[v].y), bits(positions[v].z)};
+            return std::array{cell(positions[v].x), cell(positions[v].y), cell(positions[v].z)};
         };
         std::vector<std::uint32_t> order(positions.size()), point(positions.size());
         std::iota(order.begin(), order.end(), 0u);

@@ -9,6 +9,7 @@
 #include "renderer/assets/mesh_file.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
+#include "tests/support/expect_has.h"
 #include "tests/support/gltf_document.h"
 #include "tests/support/srgb.h"
 
@@ -17,8 +18,6 @@ namespace {
 
 using namespace test;
 using nlohmann::json;
-
-#define EXPECT_HAS(text, words) EXPECT_NE((text).find(words), std::string::npos) << (text)
 
 /// What became of a file: its mesh, its warnings, or its error.
 struct MeshReading {

@@ -2,15 +2,17 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "base/constants.h"
 #include "renderer/assets/mesh_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
+#include "tests/support/expect_has.h"
 
 namespace narpa {
 namespace {
 
 using test::MemoryFolder;
-
-#define EXPECT_HAS(text, words) EXPECT_NE((text).find(words), std::string::npos) << (text)
 
 struct ObjOutcome {
     MeshFile file{};
@@ -115,6 +117,30 @@ TEST(PlateTable, AClosedSurfaceSaysWhereItsFacesCountFrom) {
     const ObjOutcome open = outcome_of("m.tab", kCorners + "v 5 5 5\nf 1 2 3\n");
     EXPECT_HAS(open.warnings, "taken to count vertices from 1; none has the last one, 4");
     EXPECT_EQ(open.file.mesh.positions.at(0), (Vec3f{0, 0, 0}));
+}
+
+TEST(PlateTable, SeamsMayDifferInTheLastDigit) {
+    constexpr int kLatitudes = 7, kLongitudes = 13;  // the last longitude is the first again
+    std::string vertices;
+    for (int i = 0; i < kLatitudes; ++i)
+        for (int j = 0; j < kLongitudes; ++j) {
+            const double polar = kPi * i / (kLatitudes - 1), azimuth = 2 * kPi * j / (kLongitudes - 1);
+            vertices += fmt::format("v {} {} {}\n", std::sin(polar) * std::cos(azimuth),
+                                    std::sin(polar) * std::sin(azimuth), std::cos(polar));
+        }
+    for (const int first : {0, 1}) {
+        std::string faces;
+        for (int i = 0; i + 1 < kLatitudes; ++i)
+            for (int j = 0; j + 1 < kLongitudes; ++j) {
+                const int a = i * kLongitudes + j + first, b = a + kLongitudes;
+                if (i > 0) faces += fmt::format("f {} {} {}\n", a, b, a + 1);
+                if (i + 2 < kLatitudes) faces += fmt::format("f {} {} {}\n", a + 1, b, b + 1);
+            }
+        const ObjOutcome o = outcome_of("m.tab", vertices + faces);
+        ASSERT_EQ(o.error, "");
+        EXPECT_HAS(o.warnings, first == 0 ? "count vertices from 0" : "taken to count vertices from 1");
+        EXPECT_EQ(o.file.degenerate, 0u) << first;
+    }
 }
 
 TEST(PlateTable, WhatCannotBeReadIsNamed) {

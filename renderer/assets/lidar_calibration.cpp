@@ -62,7 +62,7 @@ void warn_of_file(const YAML::Node& document, std::size_t beams, std::vector<std
     for (const YAML::Node& laser : document["lasers"])
         if (laser.IsMap()) warn_of_laser(laser, warnings);
     std::ranges::sort(warnings);
-    warnings.erase(std::ranges::unique(warnings).begin(), warnings.end());
+    warnings.erase(std::unique(warnings.begin(), warnings.end()), warnings.end());
 }
 
 LidarBeam read_beam(const YAML::Node& laser) {

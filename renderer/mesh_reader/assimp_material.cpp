@@ -23,7 +23,7 @@ float number(const aiMaterial& m, const char* key, unsigned type, unsigned index
 
 /// The names that Assimp gives to the materials of parts without one.
 bool is_made_up(const aiMaterial& m) {
-    const std::string_view name = m.GetName().C_Str();
+    const std::string name = m.GetName().C_Str();
     return name == AI_DEFAULT_MATERIAL_NAME || name == "%%%DEFAULT";
 }
 

@@ -199,7 +199,7 @@ TEST(GltfDeclarations, WhatIsNotDrawnIsNamed) {
     EXPECT_HAS(warnings_of(colour, basis), "its textures (KHR_texture_basisu) cannot be read and are not used");
     const MeshReading lost(gltf_triangle({{"material", 0}}, [&] {
         json all = basis;
-        all["materials"] = {colour};
+        all["materials"] = json::array({colour});
         return all;
     }()));
     EXPECT_EQ(lost.material().diffuse, (Rgb{0.5f, 0.5f, 0.5f}));

@@ -136,7 +136,7 @@ Status Emulator::open_logs() {
     return Ok{};
 }
 
-std::vector<std::string> Emulator::texts_of(const PoseRefusals& refusals) const {
+std::vector<std::string> Emulator::notices_of(const PoseRefusals& refusals) const {
     std::vector<std::string> notices;
     if (refusals.too_far_ahead > 0)
         notices.push_back(
@@ -154,8 +154,8 @@ std::vector<std::string> Emulator::texts_of(const PoseRefusals& refusals) const 
     return notices;
 }
 
-void Emulator::tell_refusals(const PoseRefusals& refusals) const {
-    for (const std::string& what : texts_of(refusals))
+void Emulator::report_refusals(const PoseRefusals& refusals) const {
+    for (const std::string& what : notices_of(refusals))
         if (options_.on_refusal) options_.on_refusal(what);
 }
 
@@ -176,7 +176,7 @@ void Emulator::note_losses() {
             fmt::format("no pose command was accepted for {}; such a body moves as the scene states", bodies));
     PoseRefusals refusals;
     can_->refusals(refusals);
-    for (std::string& what : texts_of(refusals)) notices_.push_back(std::move(what));
+    for (std::string& what : notices_of(refusals)) notices_.push_back(std::move(what));
     if (const std::uint64_t n = can_->counters().not_logged; n > 0)
         notices_.push_back(
             fmt::format("frames of others that are not in can.log, because there were more than {} a second or the "

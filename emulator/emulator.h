@@ -71,8 +71,8 @@ private:
     void send_heartbeat(std::int64_t t_ns, RunState state) noexcept;
 
     /// Why pose commands were refused, as notices.
-    [[nodiscard]] std::vector<std::string> texts_of(const PoseRefusals& refusals) const;
-    void tell_refusals(const PoseRefusals& refusals) const;
+    [[nodiscard]] std::vector<std::string> notices_of(const PoseRefusals& refusals) const;
+    void report_refusals(const PoseRefusals& refusals) const;
     void note_losses();
 
     void run_lockstep(const StopFlag& stop);

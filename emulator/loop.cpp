@@ -57,10 +57,10 @@ struct Emulator::RealTimeRun {
     }
     RealTimeClock clock;
     std::barrier<StartClock> start;
-    /// The first refusals, which the CAN thread leaves to another to tell.
+    /// The first refusals, which the CAN thread leaves to another to report.
     PoseRefusals refusals{};
     bool refused = false;
-    std::counting_semaphore<2> news{0};  ///< released with `refused`, and at the end
+    std::counting_semaphore<2> to_report{0};  ///< released with `refused`, and at the end
 };
 
 // --- Telemetry ------------------------------------------------------------
@@ -93,10 +93,10 @@ void Emulator::run_real_time(const StopFlag& stop) {
     StopFlag sensors_done{false}, observers_done{false};
     std::thread bus;
     if (can_) bus = std::thread([&] { run_bus(run, observers_done); });
-    std::thread teller([&] {
+    std::thread notifier([&] {
         name_thread("narpa-notes");
-        run.news.acquire();
-        if (run.refused) tell_refusals(run.refusals);
+        run.to_report.acquire();
+        if (run.refused) report_refusals(run.refusals);
     });
     std::vector<std::thread> sensors, observers;
     for (const auto& feed : observers_)
@@ -114,8 +114,8 @@ void Emulator::run_real_time(const StopFlag& stop) {
     for (std::thread& t : observers) t.join();
     observers_done = true;
     if (bus.joinable()) bus.join();
-    run.news.release();
-    teller.join();
+    run.to_report.release();
+    notifier.join();
     t_ns_ = std::min(run.clock.now_ns(), run.clock.end_ns());
 }
 
@@ -155,7 +155,7 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
         send_telemetry(now);
         if (can_->refuses_poses() && !std::exchange(run.refused, true)) {
             can_->refusals(run.refusals);
-            run.news.release();
+            run.to_report.release();
         }
         // A recorded bus has ended: so does the run. Set once, because an overloaded camera never reaches an end
         // that advances with the time.
@@ -204,7 +204,7 @@ void Emulator::run_lockstep(const StopFlag& stop) {
         if (can_->refuses_poses() && !std::exchange(refused, true)) {
             PoseRefusals refusals;
             can_->refusals(refusals);
-            tell_refusals(refusals);
+            report_refusals(refusals);
         }
         if (!moved || !can_->commanded()) continue;
         if (!std::exchange(started, true))

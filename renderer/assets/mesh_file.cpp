@@ -216,7 +216,7 @@ void use_vertex_colours(TriangleSoup& soup, const std::string& path) {
                         partly > 1 ? "s" : ""));
 }
 
-void tell_dropped(MeshFile& file, const std::string& path) {
+void warn_of_dropped(MeshFile& file, const std::string& path) {
     const auto warn = [&](std::size_t count, std::string_view kind) {
         if (count > 0)
             file.warnings.push_back(
@@ -259,7 +259,7 @@ Result<MeshFile> read_mesh(const std::string& path, double scale, double crease_
         return Error{.what = fmt::format("none of its {} triangles can be used: {} not finite, {} degenerate",
                                          given, file.non_finite, file.degenerate),
                      .file = path};
-    tell_dropped(file, path);
+    warn_of_dropped(file, path);
     return file;
 }
 

@@ -28,8 +28,8 @@ public:
         finish();
         warn(transparent_, "transparent (d, Tr), drawn opaque");
         warn(with_options_, "options of maps passed over, all but -clamp and -bm");
-        tell_unused(unused_maps_, "maps");
-        tell_unused(unused_, "statements");
+        warn_of_unused(unused_maps_, "maps");
+        warn_of_unused(unused_, "statements");
         return Ok{};
     }
 
@@ -40,7 +40,7 @@ private:
                 fmt::format("{}: {} material{}: {}", path_, materials, materials > 1 ? "s" : "", what));
     }
 
-    void tell_unused(const std::set<std::string>& keywords, std::string_view kind) {
+    void warn_of_unused(const std::set<std::string>& keywords, std::string_view kind) {
         std::string all;
         for (const std::string& keyword : keywords) all += (all.empty() ? "" : ", ") + keyword;
         if (!all.empty()) warnings_.push_back(fmt::format("{}: {} that are not used: {}", path_, kind, all));

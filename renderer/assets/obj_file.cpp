@@ -29,7 +29,7 @@ public:
         finish_colours();
         cut_polygons();
         if (!read_materials()) return *error_;
-        tell_unused();
+        warn_of_unused();
         return std::move(soup_);
     }
 
@@ -65,7 +65,7 @@ private:
         return true;
     }
 
-    void tell_unused() {
+    void warn_of_unused() {
         constexpr std::size_t kMost = 8;
         std::string all;
         std::size_t n = 0;

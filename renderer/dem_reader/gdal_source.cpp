@@ -33,7 +33,7 @@ std::string gdal_words() {
 
 class GdalSource final : public HeightSource {
 public:
-    GdalSource(GDALDatasetH file, HeightDeclaration declared, std::shared_ptr<VoidWatch> voids)
+    GdalSource(GDALDatasetH file, HeightDeclaration declared, std::shared_ptr<VoidDetector> voids)
         : file_(file),
           band_(GDALGetRasterBand(file, 1)),
           columns_(GDALGetRasterXSize(file)),
@@ -65,7 +65,7 @@ public:
             unusable += known && !usable;
             heights[i] = known && usable ? h : kNoHeight;
         }
-        tell_voids(row, count, heights, unusable);
+        detect_voids(row, count, heights, unusable);
         return true;
     }
 
@@ -82,11 +82,11 @@ private:
         return in_range && std::ranges::find(declared_.no_data, number) == declared_.no_data.end();
     }
 
-    void tell_voids(int row, int count, const double* heights, std::uint64_t unusable) {
+    void detect_voids(int row, int count, const double* heights, std::uint64_t unusable) {
         if (row == voids_->next_row()) voids_->count_unusable(unusable);
         const auto width = static_cast<std::size_t>(columns_);
         for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
-            voids_->see_row(row + static_cast<int>(i), {numbers_.data() + i * width, width},
+            voids_->add_row(row + static_cast<int>(i), {numbers_.data() + i * width, width},
                             {heights + i * width, width});
     }
 
@@ -94,7 +94,7 @@ private:
     GDALRasterBandH band_;
     int columns_, rows_;
     HeightDeclaration declared_;
-    std::shared_ptr<VoidWatch> voids_;
+    std::shared_ptr<VoidDetector> voids_;
     bool masked_;
     std::vector<unsigned char> mask_;
     std::vector<double> numbers_;
@@ -284,14 +284,14 @@ private:
     OGRCoordinateTransformationH transform_ = nullptr;
 };
 
-/// Watches for the limits of the numbers' type. Those of bytes and floats are no usual marks, nor is an unsigned 0.
-std::shared_ptr<VoidWatch> void_watch(GDALDataType type) {
+/// Looks for the limits of the numbers' type. Those of bytes and floats are no usual marks, nor is an unsigned 0.
+std::shared_ptr<VoidDetector> void_detector(GDALDataType type) {
     switch (type) {
-        case GDT_Int16: return std::make_shared<VoidWatch>(-32768, 32767);
-        case GDT_UInt16: return std::make_shared<VoidWatch>(kNoHeight, 65535);
-        case GDT_Int32: return std::make_shared<VoidWatch>(-2147483648.0, 2147483647.0);
-        case GDT_UInt32: return std::make_shared<VoidWatch>(kNoHeight, 4294967295.0);
-        default: return std::make_shared<VoidWatch>(kNoHeight, kNoHeight);
+        case GDT_Int16: return std::make_shared<VoidDetector>(-32768, 32767);
+        case GDT_UInt16: return std::make_shared<VoidDetector>(kNoHeight, 65535);
+        case GDT_Int32: return std::make_shared<VoidDetector>(-2147483648.0, 2147483647.0);
+        case GDT_UInt32: return std::make_shared<VoidDetector>(kNoHeight, 4294967295.0);
+        default: return std::make_shared<VoidDetector>(kNoHeight, kNoHeight);
     }
 }
 
@@ -320,7 +320,7 @@ Result<OpenDem> open_with_gdal(const DemRequest& request) {
     dem.placement = geo->placement();
     dem.warnings = std::move(declared->warnings);
     if (request.radii) declared->offset_m -= dem.placement.equatorial_m;
-    dem.voids = void_watch(GDALGetRasterDataType(GDALGetRasterBand(file, 1)));
+    dem.voids = void_detector(GDALGetRasterDataType(GDALGetRasterBand(file, 1)));
     dem.heights = std::make_unique<GdalSource>(file, std::move(*declared), dem.voids);
     if (geo->around())
         dem.heights = std::make_unique<WholePlanet>(std::move(dem.heights), dem.placement.first_pole != 0,

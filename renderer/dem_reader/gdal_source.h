@@ -6,7 +6,7 @@
 
 #include "base/result.h"
 #include "renderer/assets/dem_process.h"
-#include "renderer/dem_reader/void_watch.h"
+#include "renderer/dem_reader/void_detector.h"
 
 namespace narpa {
 
@@ -15,8 +15,8 @@ struct OpenDem {
     std::unique_ptr<HeightSource> heights;
     Placement placement;
     PostSpacing spacing;
-    std::vector<std::string> warnings;  ///< about what the file declares and is not used
-    std::shared_ptr<VoidWatch> voids;   ///< complete when all heights have been read
+    std::vector<std::string> warnings;    ///< about what the file declares and is not used
+    std::shared_ptr<VoidDetector> voids;  ///< complete when all heights have been read
 };
 
 /// GeoTIFF, PDS3, PDS4, ISIS3 cubes and PNG; the first band. Errors say what is wrong, without the file's name.

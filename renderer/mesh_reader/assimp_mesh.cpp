@@ -25,14 +25,14 @@ public:
             materials_.push_back(from_assimp(scene_, *scene_.mMaterials[i], path_, soup_.warnings));
         if (materials_.empty()) materials_.push_back(grey_material());
         if (scene_.mRootNode) read_node(*scene_.mRootNode, aiMatrix4x4t<double>());
-        tell_unused();
+        warn_of_unused();
         return {.error = problem_, .soup = std::move(soup_), .materials = std::move(materials_)};
     }
 
 private:
     void warn(std::string_view what) { soup_.warnings.push_back(fmt::format("{}: {}", path_, what)); }
 
-    void tell_unused() {
+    void warn_of_unused() {
         const auto any = [&](auto has) {
             return std::any_of(scene_.mMeshes, scene_.mMeshes + scene_.mNumMeshes, has);
         };

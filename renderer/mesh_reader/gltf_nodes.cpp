@@ -76,39 +76,39 @@ GltfNodes::GltfNodes(GltfFile& file) {
 
 void GltfNodes::place(GltfFile& file, std::int64_t root, const std::vector<std::vector<std::int64_t>>& children) {
     world_[static_cast<std::size_t>(root)] = local_of(file.item("nodes", root));
-    std::vector<std::int64_t> todo{root};
-    while (!todo.empty()) {
-        const auto node = static_cast<std::size_t>(todo.back());
-        todo.pop_back();
+    std::vector<std::int64_t> pending{root};
+    while (!pending.empty()) {
+        const auto node = static_cast<std::size_t>(pending.back());
+        pending.pop_back();
         for (const std::int64_t child : children[node]) {
             world_[static_cast<std::size_t>(child)] = world_[node] * local_of(file.item("nodes", child));
-            todo.push_back(child);
+            pending.push_back(child);
         }
     }
 }
 
 void GltfNodes::show_scene(GltfFile& file, const std::vector<std::vector<std::int64_t>>& children,
                            const std::vector<std::int64_t>& roots) {
-    std::vector<std::int64_t> todo = roots;
+    std::vector<std::int64_t> pending = roots;
     if (const json* scenes = member(file.root(), "scenes"); scenes != nullptr && !scenes->empty()) {
         const std::int64_t chosen = std::max<std::int64_t>(0, index_or_none(file.root(), "scene"));
-        todo = indices(file.item("scenes", chosen), "nodes");
+        pending = indices(file.item("scenes", chosen), "nodes");
         if (scenes->size() > 1)
             file.warn(
                 fmt::format("of its {} scenes only scene {} is used, counted from 0", scenes->size(), chosen));
     }
     std::vector<bool> seen(children.size(), false);
-    std::reverse(todo.begin(), todo.end());
-    while (!todo.empty()) {
-        const std::int64_t node = todo.back();
-        todo.pop_back();
+    std::reverse(pending.begin(), pending.end());
+    while (!pending.empty()) {
+        const std::int64_t node = pending.back();
+        pending.pop_back();
         file.check_item("nodes", node);
         if (seen[static_cast<std::size_t>(node)])
             gltf_fail(fmt::format("node {} is in the scene twice, expected a tree", node));
         seen[static_cast<std::size_t>(node)] = true;
         shown_.push_back(node);
         const auto& below = children[static_cast<std::size_t>(node)];
-        todo.insert(todo.end(), below.rbegin(), below.rend());
+        pending.insert(pending.end(), below.rbegin(), below.rend());
     }
 }
 

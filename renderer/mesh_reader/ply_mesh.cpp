@@ -73,14 +73,14 @@ public:
         }
         if (file_.textures.size() > 1)
             warn(fmt::format("of its {} textures only the first is used", file_.textures.size()));
-        tell_unused();
+        warn_of_unused();
         return {.soup = std::move(soup_), .materials = {std::move(material)}};
     }
 
 private:
     void warn(std::string_view what) { soup_.warnings.push_back(fmt::format("{}: {}", path_, what)); }
 
-    void tell_unused() {
+    void warn_of_unused() {
         std::string all;
         for (const std::string& name : unused_) all += (all.empty() ? "" : ", ") + name;
         if (!all.empty()) warn("elements and properties that are not used: " + all);

@@ -1,4 +1,4 @@
-#include "renderer/dem_reader/void_watch.h"
+#include "renderer/dem_reader/void_detector.h"
 
 #include <fmt/format.h>
 
@@ -22,7 +22,7 @@ bool is_usual_mark(double number) {
 }  // namespace
 
 /// `sign`: 1 for the highest, -1 for the lowest.
-void VoidWatch::Extreme::see(double x, double sign) {
+void VoidDetector::Extreme::add(double x, double sign) {
     if (x == number) {
         ++posts;
     } else if (posts == 0 || sign * x > sign * number) {
@@ -32,12 +32,12 @@ void VoidWatch::Extreme::see(double x, double sign) {
     }
 }
 
-bool VoidWatch::Extreme::is_suspect(double other_extreme) const {
+bool VoidDetector::Extreme::is_suspect(double other_extreme) const {
     const bool far = std::abs(number - next) > kFarShare * std::abs(next - other_extreme);
     return (number == limit || is_usual_mark(number)) && far;
 }
 
-std::string VoidWatch::Extreme::warning(const char* which) const {
+std::string VoidDetector::Extreme::warning(const char* which) const {
     return fmt::format(
         "the number {:.10g} of {} of its posts, {}, is not marked as missing data and is used as a "
         "height; no_data = {:.10g} makes holes of such posts",
@@ -45,14 +45,14 @@ std::string VoidWatch::Extreme::warning(const char* which) const {
         number);
 }
 
-void VoidWatch::see_step(double from, double to, int row, int column) {
+void VoidDetector::add_step(double from, double to, int row, int column) {
     if (!(std::abs(to - from) > kSteepest * spacing_m_)) return;
     const std::uint64_t count = step_.count + 1;
     if (count == 1 || std::abs(to - from) > std::abs(step_.to_m - step_.from_m)) step_ = {from, to, row, column, 0};
     step_.count = count;
 }
 
-void VoidWatch::see_row(int row, std::span<const double> numbers, std::span<const double> heights) {
+void VoidDetector::add_row(int row, std::span<const double> numbers, std::span<const double> heights) {
     if (row < next_row_) return;
     if (row > next_row_) last_.clear();
     next_row_ = row + 1;
@@ -61,15 +61,15 @@ void VoidWatch::see_row(int row, std::span<const double> numbers, std::span<cons
     for (std::size_t c = 0; c < heights.size(); ++c) {
         const double h = heights[c], n = numbers[c];
         const bool known = h == h;
-        if (known) low_.see(n, -1), high_.see(n, 1);
+        if (known) low_.add(n, -1), high_.add(n, 1);
         const double plain = known && !is_usual_mark(n) && n != low_.limit && n != high_.limit ? h : kNoHeight;
-        see_step(west, plain, row, static_cast<int>(c));
-        see_step(last_[c], plain, row, static_cast<int>(c));
+        add_step(west, plain, row, static_cast<int>(c));
+        add_step(last_[c], plain, row, static_cast<int>(c));
         west = last_[c] = plain;
     }
 }
 
-std::vector<std::string> VoidWatch::warnings() const {
+std::vector<std::string> VoidDetector::warnings() const {
     std::vector<std::string> out;
     if (low_.is_suspect(high_.number)) out.push_back(low_.warning("lowest"));
     if (high_.is_suspect(low_.number)) out.push_back(high_.warning("highest"));

@@ -1,4 +1,4 @@
-/// renderer/dem_reader/void_watch.h - finds voids that a DEM does not mark, from the numbers of its posts.
+/// renderer/dem_reader/void_detector.h - finds voids that a DEM does not mark, from the numbers of its posts.
 #pragma once
 
 #include <span>
@@ -9,18 +9,19 @@
 
 namespace narpa {
 
-/// Sees each row of a DEM once, from the first to the last, and tells numbers that look like marks of missing data:
-/// limits of the numbers' type and the usual marks (-9999 ...) that are the lowest or highest of all and far from
-/// the rest, and steps between neighbours that are steeper than 87 degrees.
-class VoidWatch {
+/// Takes each row of a DEM once, from the first to the last, and names numbers that look like marks of missing
+/// data: limits of the numbers' type and the usual marks (-9999 ...) that are the lowest or highest of all and far
+/// from the rest, and steps between neighbours that are steeper than 87 degrees.
+class VoidDetector {
 public:
     /// `type_lowest` and `type_highest`: limits of an integer type that are likely marks; NaN: none.
-    VoidWatch(double type_lowest, double type_highest) : low_{.limit = type_lowest}, high_{.limit = type_highest} {}
+    VoidDetector(double type_lowest, double type_highest)
+        : low_{.limit = type_lowest}, high_{.limit = type_highest} {}
 
     /// Distance of posts, the larger one of rows and columns, metres: before the first row.
     void set_spacing(double spacing_m) { spacing_m_ = spacing_m; }
-    /// `numbers` as stored; `heights`: NaN where the post has none. Rows that were seen already are passed over.
-    void see_row(int row, std::span<const double> numbers, std::span<const double> heights);
+    /// `numbers` as stored; `heights`: NaN where the post has none. Rows that were taken already are passed over.
+    void add_row(int row, std::span<const double> numbers, std::span<const double> heights);
     /// Posts whose height is beyond what a planet has, and which are holes therefore.
     void count_unusable(std::uint64_t posts) { unusable_ += posts; }
     [[nodiscard]] int next_row() const { return next_row_; }
@@ -30,7 +31,7 @@ private:
     struct Extreme {
         double limit = kNoHeight, number = kNoHeight, next = kNoHeight;  ///< next: the second lowest or highest
         std::uint64_t posts = 0;
-        void see(double x, double sign);
+        void add(double x, double sign);
         [[nodiscard]] bool is_suspect(double other_extreme) const;
         [[nodiscard]] std::string warning(const char* which) const;
     };
@@ -39,7 +40,7 @@ private:
         int row = 0, column = 0;
         std::uint64_t count = 0;
     };
-    void see_step(double from, double to, int row, int column);
+    void add_step(double from, double to, int row, int column);
 
     Extreme low_, high_;
     Step step_;

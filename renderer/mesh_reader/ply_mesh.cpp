@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "renderer/assets/mesh_readers.h"
 #include "renderer/mesh_reader/mesh_reader.h"
@@ -60,9 +62,8 @@ public:
     PlyReader(PlyFile& file, const std::string& path) : file_(file), path_(path) {}
 
     MeshMessage read() {
-        for (const PlyElement& element : file_.elements)
-            if (Status read = read_element(element); !read)
-                return {.error = read.error().what, .line = read.error().line, .column = read.error().column};
+        if (Status read = read_elements(); !read)
+            return {.error = read.error().what, .line = read.error().line, .column = read.error().column};
         if (!faces_have_colours_ && vertex_colours_.given()) vertex_colours_.finish(soup_.colours);
         if (faces_have_colours_) face_colours_.finish(soup_.colours);
         PlainMaterial material = grey_material();
@@ -97,13 +98,44 @@ private:
         used_.clear();
     }
 
-    Status read_element(const PlyElement& element) {
-        if (element.name == "vertex") return read_vertices(element);
-        if (element.name == "face" || element.name == "tristrips") return read_faces(element);
-        if (element.count > 0) unused_.insert(element.name);
+    /// Faces that come before the vertices wait for them.
+    Status read_elements() {
+        struct Faces {
+            const PlyElement* element;
+            std::vector<PlyValues> rows;
+        };
+        std::vector<Faces> waiting;
+        bool has_vertices = false;
+        for (const PlyElement& element : file_.elements) {
+            const bool has_faces = element.name == "face" || element.name == "tristrips";
+            Status read = Ok{};
+            if (element.name == "vertex") {
+                has_vertices = true;
+                read = read_vertices(element);
+            } else if (has_faces && has_vertices) {
+                read = read_faces(element, [&](std::size_t i, PlyValues& v) { return file_.read(element, i, v); });
+            } else {
+                read = keep_values(element, has_faces ? &waiting.emplace_back(Faces{&element, {}}).rows : nullptr);
+            }
+            if (!read) return read;
+        }
+        for (Faces& faces : waiting) {
+            const auto next = [&](std::size_t i, PlyValues& v) -> Status {
+                return v = std::move(faces.rows[i]), Ok{};
+            };
+            if (Status read = read_faces(*faces.element, next); !read) return read;
+        }
+        return Ok{};
+    }
+
+    /// `rows`: null where the element is not used.
+    Status keep_values(const PlyElement& element, std::vector<PlyValues>* rows) {
+        if (rows == nullptr && element.count > 0) unused_.insert(element.name);
         PlyValues values;
-        for (std::size_t i = 0; static_cast<double>(i) < element.count; ++i)
+        for (std::size_t i = 0; static_cast<double>(i) < element.count; ++i) {
             if (Status read = file_.read(element, i, values); !read) return read;
+            if (rows != nullptr) rows->push_back(values);
+        }
         return Ok{};
     }
 
@@ -131,7 +163,8 @@ private:
         return Ok{};
     }
 
-    Status read_faces(const PlyElement& e) {
+    /// `next(i, values)` gives the values of face `i`.
+    Status read_faces(const PlyElement& e, const auto& next) {
         const int list = e.find({"vertex_indices", "vertex_index"});
         const bool is_strips = e.name == "tristrips";
         if (list < 0) return file_.error(fmt::format("its {} have no vertex_indices", e.name));
@@ -145,7 +178,7 @@ private:
         note_unused(e);
         PlyValues v;
         for (std::size_t i = 0; static_cast<double>(i) < e.count; ++i) {
-            if (Status read = file_.read(e, i, v); !read) return read;
+            if (Status read = next(i, v); !read) return read;
             const std::uint32_t colour = colour_of(colours, v);
             const std::vector<double>& corners = v[static_cast<std::size_t>(list)];
             Status added =

@@ -178,6 +178,21 @@ TEST(PlyDeclarations, StripsWedgesAndTexturesAreUsed) {
         EXPECT_EQ(mesh.uvs[i][1], mesh.positions[i].y * (mesh.positions[i].x > 0 ? 1 : 0.5f));
 }
 
+TEST(PlyDeclarations, FacesMayComeBeforeTheVertices) {
+    const std::string vertices = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n",
+                      faces = "element face 1\nproperty list uchar int vertex_indices\n";
+    const ObjOutcome o = outcome_of(
+        "m.ply", "ply\nformat ascii 1.0\n" + faces + vertices + "end_header\n3 0 1 2\n0 0 0\n1 0 0\n0 2 0\n");
+    ASSERT_EQ(o.error, "");
+    EXPECT_EQ(o.warnings, "");
+    ASSERT_EQ(o.file.mesh.faces.size(), 1u);
+    EXPECT_EQ(o.file.mesh.positions.at(o.file.mesh.faces[0][2]), (Vec3f{0, 2, 0}));
+    EXPECT_HAS(outcome_of("m.ply", "ply\nformat ascii 1.0\n" + faces + vertices +
+                                       "end_header\n3 0 1 3\n0 0 0\n1 0 0\n0 2 0\n")
+                   .error,
+               "a face has vertex 3, counted from 0, of 3");
+}
+
 TEST(PlyDeclarations, TheRestIsNamed) {
     const auto read = [](const std::string& more, const std::string& format = "ascii") {
         return outcome_of("m.ply", "ply\nformat " + format +

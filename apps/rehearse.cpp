@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "apps/cli.h"
+#include "apps/rehearsal_text.h"
 #include "apps/shipped.h"
 #include "rehearsal/runner/campaign.h"
 #include "rehearsal/runner/rehearsal.h"
@@ -16,6 +17,7 @@ struct RehearseOptions {
     std::vector<std::string> video;
     std::size_t runs = 0;  ///< 0: one, without a summary
     int jobs = 1;
+    bool replace = false;
 };
 
 /// True if a line has arrived on standard input.
@@ -43,17 +45,7 @@ Outcome one(const rehearsal::RehearsalOptions& options) {
         progress.show("starting");
         return rehearsal::run_rehearsal(options, console(progress), stop_flag());
     }();
-    if (!done) return done.error();
-    for (const rehearsal::GateResult& g : done->verdict.gates)
-        say(fmt::format("  {:<10} {:<19} {}", rehearsal::kGateStates[static_cast<std::size_t>(g.state)], g.name,
-                        g.reason));
-    say(done->verdict.headline);
-    if (!done->page.empty()) say("wrote " + done->page);
-    if (done->written) return done->result;
-    say("narpa: " + done->written.error().text());
-    nlohmann::json document = done->result;
-    document.update(cli::to_json(done->written.error()));
-    return document;
+    return print_run(done);
 }
 
 Outcome many(const rehearsal::CampaignOptions& options) {
@@ -62,19 +54,7 @@ Outcome many(const rehearsal::CampaignOptions& options) {
         progress.show("starting");
         return rehearsal::run_campaign(options, console(progress), stop_flag());
     }();
-    if (!summary) return summary;
-    const nlohmann::json& s = *summary;
-    say(fmt::format("{}; with 95 % confidence {:.1f} to {:.1f} % of all do", rehearsal::campaign_headline(s),
-                    s["success_interval_95"][0].get<double>() * 100,
-                    s["success_interval_95"][1].get<double>() * 100));
-    for (const auto& c : s["contact"])
-        say(fmt::format("  {:<22} {:>8.4f} +- {:.4f}, at most {:.4f} {}; asked {:g} to {:g}",
-                        c["title"].get<std::string>(), c["mean"].get<double>(), c["sigma"].get<double>(),
-                        c["max"].get<double>(), c["unit"].get<std::string>(), c["asked_min"].get<double>(),
-                        c["asked_max"].get<double>()));
-    for (const auto& [gate, list] : s["failures"].items()) say(fmt::format("  {}: {} runs", gate, list.size()));
-    say("wrote " + options.run.folder + "/index.html");
-    return summary;
+    return print_campaign(std::move(summary), options.run.folder);
 }
 
 Outcome rehearse(const RehearseOptions& given) {
@@ -90,9 +70,9 @@ Outcome rehearse(const RehearseOptions& given) {
     o.scenario = *file;
     auto scenario = rehearsal::read_scenario(o.scenario);
     if (!scenario) return scenario.error();
-    if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name;
+    if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name + (given.runs > 0 ? "-campaign" : "");
     stop_on_signals();
-    return given.runs > 0 ? many({o, given.runs, given.jobs}) : one(o);
+    return given.runs > 0 ? many({o, given.runs, given.jobs, given.replace}) : one(o);
 }
 
 }  // namespace
@@ -104,17 +84,22 @@ Command add_rehearse(Parser app) {
     const Parser c = app.subcommand(
         "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and apply its gates");
     c.option("SCENARIO", r.scenario, "Scenario file, or a name that `narpa list` shows (default: docking)");
-    c.option("-o,--output", r.folder,
-             "Folder for page, verdict, logs (default: out/rehearsal/NAME, of the scenario's name): new, empty, or "
-             "an earlier run's, which is replaced once all programs have started")
+    c.option(
+         "-o,--output", r.folder,
+         "Folder for page, verdict, logs (default: out/rehearsal/NAME, of the scenario's name; with --runs "
+         "out/rehearsal/NAME-campaign): new, empty, or an earlier run's, which is replaced once all programs have "
+         "started")
         .type_name("DIR");
     c.flag("--real-time", r.real_time,
            "In real time, with deadlines (default: in lockstep, the same bytes each time)");
     c.option("--seed", r.seed, "Seed of the dispersions and of all noise (default: the scenario's)");
     const Option runs = c.option("--runs", o->runs,
                                  "Number of runs over the dispersions, run k with seed + k - 1, each in DIR/runs; "
-                                 "continues an interrupted campaign")
+                                 "continues an interrupted campaign, keeps what was flown")
                             .range(1, 100000);
+    c.flag("--replace", o->replace,
+           "Fly runs of a campaign again that were flown with another scenario or seed (default: refuse)")
+        .needs(runs);
     c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
     c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2 | usb:[ADAPTER]")
         .type_name("BUS")

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 #include "base/constants.h"
+#include "drivers/can/can_bus.h"
+
 namespace narpa::rehearsal {
 
 Judge::Judge(const Scenario& scenario, Failure on_failure)
@@ -74,6 +77,13 @@ void Judge::check(const JudgedEstimate& estimate) {
     if (scenario_.gates.navigation && (too_far || too_turned) && !reported) report("navigation");
 }
 
+Status accept_log(Judge& judge, const std::string& path) {
+    auto log = open_can_bus("log:" + path, CanRole::hub);
+    if (!log) return log.error();
+    for (ReceivedFrame received; (*log)->receive(received);) judge.accept(received.frame, received.t_received_ns);
+    return Ok{};
+}
+
 // --- The verdict ----------------------------------------------------------------------------------------------
 
 NavigationStatistics Judge::navigation_statistics() const {
@@ -128,20 +138,22 @@ LedgerStatistics Judge::ledger_statistics() const {
     return s;
 }
 
-std::string Judge::headline(const Verdict& v, const std::string& trouble) const {
+void Judge::set_headline(Verdict& v, const std::string& trouble) const {
     const auto failed = std::find_if(v.gates.begin(), v.gates.end(),
                                      [](const GateResult& g) { return g.state == GateState::failed; });
     const std::string what = t_captured_ns_ ? fmt::format("{} after {:.1f} s", scenario_.gear ? "Landed" : "Docked",
                                                           bus_.seconds(*t_captured_ns_))
                                             : fmt::format("Flown for {:.1f} s", v.t_end_s);
-    if (!trouble.empty()) return fmt::format("{}, but {}", what, trouble);
-    if (failed == v.gates.end()) return what + ", all gates passed";
+    v.outcome = v.headline =
+        trouble.empty() ? what + ", all gates passed" : fmt::format("{}, but {}", what, trouble);
+    if (!trouble.empty() || failed == v.gates.end()) return;
     // The gate that failed first is the likely cause; an unfinished run is usually its consequence.
     auto cause = failed;
     for (auto g = failed; g != v.gates.end(); ++g)
         if (g->state == GateState::failed && g->t_first_s.value_or(1e30) < cause->t_first_s.value_or(1e30))
             cause = g;
-    return fmt::format("{}, but gate {} failed: {}", what, cause->name, cause->reason);
+    v.outcome = fmt::format("{}, but gate {} failed", what, cause->name);
+    v.headline = v.outcome + ": " + cause->reason;
 }
 
 Verdict Judge::finish(const std::string& trouble) const {
@@ -157,7 +169,7 @@ Verdict Judge::finish(const std::string& trouble) const {
     }
     if (const auto complete = std::ranges::find(v.gates, "complete", &GateResult::name); !trouble.empty()) {
         complete->state = GateState::failed;
-        complete->reason = trouble + "; " + complete->reason;
+        complete->details.insert(complete->details.begin(), std::exchange(complete->reason, trouble));
     }
     v.passed = std::none_of(v.gates.begin(), v.gates.end(),
                             [](const GateResult& g) { return g.state == GateState::failed; });
@@ -171,7 +183,7 @@ Verdict Judge::finish(const std::string& trouble) const {
     v.heartbeats = bus_.heartbeats.received;
     v.refused = bus_.refused;
     v.late = bus_.late;
-    v.headline = headline(v, trouble);
+    set_headline(v, trouble);
     return v;
 }
 

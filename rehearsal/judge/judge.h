@@ -107,7 +107,7 @@ private:
     [[nodiscard]] std::optional<Contact> contact_made() const;
     [[nodiscard]] NavigationStatistics navigation_statistics() const;
     [[nodiscard]] LedgerStatistics ledger_statistics() const;
-    [[nodiscard]] std::string headline(const Verdict& verdict, const std::string& trouble) const;
+    void set_headline(Verdict& verdict, const std::string& trouble) const;
 
     const Scenario scenario_;
     const Failure on_failure_;
@@ -122,5 +122,8 @@ private:
     LimitMonitor<JudgedEstimate> position_, attitude_,
         sigmas_;  ///< largest errors, and those in standard deviations for the gate
 };
+
+/// Passes all frames of a candump log to the judge.
+Status accept_log(Judge& judge, const std::string& path);
 
 }  // namespace narpa::rehearsal

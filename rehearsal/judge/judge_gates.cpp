@@ -38,37 +38,45 @@ std::string last_message(const BusRecord& bus, std::int64_t t_ns) {
 /// The program whose message was due next and did not arrive: why a run broke off. In lockstep each program waits
 /// for the one before: poses, the emulator's heartbeat of their time, the command. In real time none waits: it is
 /// the program that stopped first.
-std::string missing_sender(const Scenario& scenario, const BusRecord& bus) {
-    const std::int64_t slack = bus.heartbeats.lockstep ? 1'000'000 : 2 * scenario.period_ns();
+std::string missing_sender(const BusRecord& bus, std::int64_t period_ns, std::int64_t t_command) {
+    const std::int64_t slack = bus.heartbeats.lockstep ? 1'000'000 : 2 * period_ns;
     const std::int64_t t_report = bus.reports.empty() ? BusRecord::kNever : bus.reports.back().t_ns;
-    const std::int64_t t_command = bus.commands.empty() ? BusRecord::kNever : bus.commands.back().t_ns;
-    const std::string last =
-        fmt::format("last received: poses {}, heartbeat {}, thruster command {}", last_message(bus, bus.t_pose_ns),
-                    last_message(bus, bus.t_heartbeat_ns), last_message(bus, t_command));
     const auto behind = [&](std::int64_t t, std::int64_t other) {
         return other != BusRecord::kNever && (t == BusRecord::kNever || t < other - slack);
     };
-    if (bus.heartbeats.received == 0) return "the emulator sent nothing; " + last;
-    if (bus.t_pose_ns == BusRecord::kNever) return "the dynamics sent nothing; " + last;
-    if (behind(bus.t_heartbeat_ns, bus.t_pose_ns)) return "the emulator stopped sending; " + last;
+    if (bus.heartbeats.received == 0) return "the emulator sent nothing";
+    if (bus.t_pose_ns == BusRecord::kNever) return "the dynamics sent nothing";
+    if (behind(bus.t_heartbeat_ns, bus.t_pose_ns)) return "the emulator stopped sending";
     if (bus.heartbeats.lockstep ? behind(t_command, t_report) : behind(t_command, bus.t_pose_ns))
-        return fmt::format("the navigation {}; {}",
-                           t_command == BusRecord::kNever ? "sent nothing" : "stopped sending", last);
-    return "the dynamics stopped sending; " + last;
+        return fmt::format("the navigation {}",
+                           t_command == BusRecord::kNever ? "sent nothing" : "stopped sending");
+    return "the dynamics stopped sending";
 }
 
-/// "at t = .. s: WORDS; worst at t = .. s: WORDS" or "nearest to it at ..".
+/// Who is awaited, and what was received last.
+std::array<std::string, 2> standstill(const Scenario& scenario, const BusRecord& bus) {
+    const std::int64_t t_command = bus.commands.empty() ? BusRecord::kNever : bus.commands.back().t_ns;
+    return {
+        missing_sender(bus, scenario.period_ns(), t_command),
+        fmt::format("last received: poses {}, heartbeat {}, thruster command {}", last_message(bus, bus.t_pose_ns),
+                    last_message(bus, bus.t_heartbeat_ns), last_message(bus, t_command))};
+}
+
+/// The first violation: "WORDS at t = .. s (..)"; without one, the sample nearest to the limit.
 template <class Sample, class Words>
-std::string first_and_worst(const Scenario& scenario, const BusRecord& bus, const LimitMonitor<Sample>& monitor,
-                            Words words) {
-    if (!monitor.first) {
-        if (!monitor.worst) return "never near it";
-        return "nearest to the limit " + when(scenario, bus, monitor.worst->t_ns) + ": " + words(*monitor.worst);
-    }
-    std::string text = when(scenario, bus, monitor.first->t_ns) + ": " + words(*monitor.first);
-    if (monitor.worst->t_ns != monitor.first->t_ns)
-        text += "; worst " + when(scenario, bus, monitor.worst->t_ns) + ": " + words(*monitor.worst);
-    return text;
+std::string first_text(const Scenario& scenario, const BusRecord& bus, const LimitMonitor<Sample>& monitor,
+                       Words words) {
+    const auto at = [&](const Sample& s) { return words(s) + " " + when(scenario, bus, s.t_ns); };
+    if (monitor.first) return at(*monitor.first);
+    return monitor.worst ? "nearest to the limit: " + at(*monitor.worst) : "never near the limit";
+}
+
+/// Adds the worst violation, if it is not the first one.
+template <class Sample, class Words>
+void add_worst(const Scenario& scenario, const BusRecord& bus, const LimitMonitor<Sample>& monitor, Words words,
+               std::vector<std::string>& details) {
+    if (monitor.first && monitor.worst->t_ns != monitor.first->t_ns)
+        details.push_back("worst: " + words(*monitor.worst) + " " + when(scenario, bus, monitor.worst->t_ns));
 }
 
 /// " (limit 0.5 m)"; empty: there is none.
@@ -209,12 +217,14 @@ void Judge::judge_poses(const GateKind& kind, GateResult& gate) const {
     gate.margin = monitor.margin;
     if (monitor.first) gate.t_first_s = bus_.seconds(monitor.first->t_ns);
     if (monitor.worst) gate.t_worst_s = bus_.seconds(monitor.worst->t_ns);
-    gate.reason =
-        first_and_worst(scenario_, bus_, monitor, [&](const TruthState& s) { return kind.pose_text(gates, s); });
+    const auto words = [&](const TruthState& s) { return kind.pose_text(gates, s); };
+    gate.reason = first_text(scenario_, bus_, monitor, words);
+    add_worst(scenario_, bus_, monitor, words, gate.details);
 }
 
 std::string Judge::awaited() const {
-    return missing_sender(scenario_, bus_);
+    const auto [sender, last] = standstill(scenario_, bus_);
+    return sender + "; " + last;
 }
 
 void Judge::judge_navigation(GateResult& gate) const {
@@ -230,44 +240,54 @@ void Judge::judge_navigation(GateResult& gate) const {
                                           : "no estimate was on the bus";
         return;
     }
-    const auto position = [](const JudgedEstimate& e) {
-        return fmt::format("{:.3f} m off, standard deviations {:.3f}, {:.3f}, {:.3f} m", norm(e.position_error_m),
-                           e.sigma_position_m.x, e.sigma_position_m.y, e.sigma_position_m.z);
-    };
-    const auto attitude = [](const JudgedEstimate& e) {
-        return fmt::format("{:.3f} deg off, standard deviations {:.3f}, {:.3f}, {:.3f} deg",
-                           norm(e.rotation_error_rad) * kDegPerRad, e.sigma_rotation_rad.x * kDegPerRad,
-                           e.sigma_rotation_rad.y * kDegPerRad, e.sigma_rotation_rad.z * kDegPerRad);
-    };
+    const NavigationStatistics s = navigation_statistics();
+    const bool enough = s.share_within >= limits.share;
+    gate.margin = (s.share_within - limits.share) * 100;
+    gate.t_worst_s = bus_.seconds(sigmas_.worst->t_ns);
+
     const auto sigmas = [](const JudgedEstimate& e) {
         return fmt::format("{:.2f} standard deviations", e.largest_in_sigmas());
     };
-    const NavigationStatistics s = navigation_statistics();
-    const bool enough = s.share_within >= limits.share;
-    const bool good = enough && !position_.first && !attitude_.first;
+    const auto metres = [&](const JudgedEstimate& e) {
+        return fmt::format("position {:.3f} m off{}", norm(e.position_error_m), limit_text(limits.position_m, "m"));
+    };
+    const auto degrees = [&](const JudgedEstimate& e) {
+        return fmt::format("attitude {:.3f} deg off{}", norm(e.rotation_error_rad) * kDegPerRad,
+                           limit_text(limits.attitude_deg, "deg"));
+    };
+    struct Finding {
+        double t_first_s;  ///< infinite: no violation
+        std::string text;
+        std::vector<std::string> details{};
+    };
+    const auto t_first_s = [&](const LimitMonitor<JudgedEstimate>& m) {
+        return m.first ? bus_.seconds(m.first->t_ns) : kInfinity;
+    };
+    std::vector<Finding> findings;
+    const auto add = [&](const LimitMonitor<JudgedEstimate>& monitor, const auto& words,
+                         const std::string& largest) {
+        if (!monitor.worst) return findings.push_back({kInfinity, largest});  // there is no limit
+        findings.push_back({t_first_s(monitor), first_text(scenario_, bus_, monitor, words)});
+        add_worst(scenario_, bus_, monitor, words, findings.back().details);
+    };
+    add(position_, metres, fmt::format("largest position error {:.3f} m", s.position_m.max));
+    add(attitude_, degrees, fmt::format("largest attitude error {:.3f} deg", s.attitude_deg.max));
+    findings.push_back({enough ? kInfinity : t_first_s(sigmas_),
+                        fmt::format("{:.2f} % of {} estimates are within {:g} standard deviations, asked {:g} %",
+                                    s.share_within * 100, s.estimates, limits.sigmas, limits.share * 100)});
+    findings.back().details = {"largest: " + sigmas(*sigmas_.worst) + " " +
+                               when(scenario_, bus_, sigmas_.worst->t_ns)};
+    std::ranges::stable_sort(findings, {}, &Finding::t_first_s);
+
+    const bool good = findings.front().t_first_s == kInfinity;
     gate.state = good ? GateState::passed : GateState::failed;
-    gate.margin = (s.share_within - limits.share) * 100;
-    if (sigmas_.worst) gate.t_worst_s = bus_.seconds(sigmas_.worst->t_ns);
-    for (const auto* monitor : {&position_, &attitude_})
-        if (monitor->first && (!gate.t_first_s || bus_.seconds(monitor->first->t_ns) < *gate.t_first_s))
-            gate.t_first_s = bus_.seconds(monitor->first->t_ns);
-    gate.reason = fmt::format("{:.2f} % of {} estimates are within {:g} standard deviations (asked {:g} %)",
-                              s.share_within * 100, s.estimates, limits.sigmas, limits.share * 100);
-    if (!enough && sigmas_.first) {
-        if (!gate.t_first_s) gate.t_first_s = bus_.seconds(sigmas_.first->t_ns);
-        gate.reason += ", first beyond " + first_and_worst(scenario_, bus_, sigmas_, sigmas);
-    } else {
-        gate.reason += ", most " + when(scenario_, bus_, sigmas_.worst->t_ns) + ": " + sigmas(*sigmas_.worst);
+    if (!good) gate.t_first_s = findings.front().t_first_s;
+    if (good) std::ranges::rotate(findings, findings.end() - 1);
+    gate.reason = findings.front().text;
+    for (const Finding& f : findings) {
+        if (&f != &findings.front()) gate.details.push_back(f.text);
+        gate.details.insert(gate.details.end(), f.details.begin(), f.details.end());
     }
-    const std::string limit_m = limit_text(limits.position_m, "m"),
-                      limit_deg = limit_text(limits.attitude_deg, "deg");
-    if (position_.first)
-        gate.reason += "; position" + limit_m + " " + first_and_worst(scenario_, bus_, position_, position);
-    if (attitude_.first)
-        gate.reason += "; attitude" + limit_deg + " " + first_and_worst(scenario_, bus_, attitude_, attitude);
-    if (good)
-        gate.reason += fmt::format("; largest errors {:.3f} m{}, {:.3f} deg{}", s.position_m.max, limit_m,
-                                   s.attitude_deg.max, limit_deg);
 }
 
 std::optional<Contact> Judge::contact_made() const {
@@ -296,29 +316,31 @@ void Judge::judge_contact(GateResult& gate) const {
         return;
     }
     gate.t_worst_s = made->t_s;
-    std::string beyond;
+    std::vector<std::string> beyond;
     double least = std::numeric_limits<double>::infinity();
     for (const ContactCondition& c : made->conditions) {
         // The margin of the whole gate: the least remaining margin of all conditions, as a part of their range.
         least = std::min(
             {least, (c.max - c.value) / (c.max - c.min), c.min > 0 ? (c.value - c.min) / (c.max - c.min) : 1.0});
         if (!c.within())
-            beyond += fmt::format("{}{} {:.4f} {}, asked {:g} to {:g}", beyond.empty() ? "" : "; ", c.title,
-                                  c.value, c.unit, c.min, c.max);
+            beyond.push_back(
+                fmt::format("{} {:.4f} {}, asked {:g} to {:g}", c.title, c.value, c.unit, c.min, c.max));
     }
     gate.margin = least * 100;
     gate.state = beyond.empty() && made->captured ? GateState::passed : GateState::failed;
     if (gate.state == GateState::failed) gate.t_first_s = made->t_s;
-    gate.reason = when(scenario_, bus_, *t_contact_ns_) + (made->captured ? ", captured" : ", bounced off");
-    if (!beyond.empty()) {
-        gate.reason += ": " + beyond;
-    } else {
+    gate.reason = (made->captured ? "captured" : "bounced off") + (" " + when(scenario_, bus_, *t_contact_ns_));
+    if (beyond.empty()) {
         const auto value = [&](std::size_t i) { return made->conditions[i].value; };
-        gate.reason += fmt::format(
-            ": closing {:.3f} m/s, {:.3f} m off the axis at {:.3f} m/s, {:.2f} deg pitch and "
-            "yaw, {:.2f} deg roll",
-            value(0), value(2), value(1), value(3), value(4));
+        gate.details = {
+            fmt::format("closing {:.3f} m/s, {:.3f} m off the axis at {:.3f} m/s, {:.2f} deg pitch and "
+                        "yaw, {:.2f} deg roll",
+                        value(0), value(2), value(1), value(3), value(4))};
+        return;
     }
+    beyond.push_back(gate.reason);
+    gate.reason = beyond.front();
+    gate.details.assign(beyond.begin() + 1, beyond.end());
 }
 
 /// The ground under the feet where the lander came to rest, or where the run ended.
@@ -383,8 +405,11 @@ void Judge::judge_complete(GateResult& gate) const {
     if (gave_up && scenario_.gates.complete) return;
     const DynamicsReport* finished = bus_.first_report(DynamicsPhase::finished);
     if (!finished) {
-        gate.reason +=
-            (gave_up ? "; the run broke off: " : "the run broke off: ") + missing_sender(scenario_, bus_);
+        const auto [sender, last] = standstill(scenario_, bus_);
+        const std::string broke_off = "the run broke off: " + sender;
+        if (gave_up) gate.details.push_back(broke_off);
+        if (!gave_up) gate.reason = broke_off;
+        gate.details.push_back(last);
         return;
     }
     const double t_end_s = bus_.seconds(finished->t_ns);
@@ -399,14 +424,15 @@ void Judge::judge_complete(GateResult& gate) const {
                                           bus_.seconds(done->t_ns));
         return;
     }
-    if (!gate.reason.empty()) gate.reason += "; ";
-    gate.reason += fmt::format("over at t = {:.2f} s", t_end_s);
-    if (!bus_.commands.empty()) gate.reason += " in " + leg_text(scenario_, bus_.commands.back().leg);
-    if (!bus_.truth.empty()) gate.reason += fmt::format(", the ports {:.2f} m apart", bus_.truth.back().range_m());
+    std::string over = fmt::format("over at t = {:.2f} s", t_end_s);
+    if (!bus_.commands.empty()) over += " in " + leg_text(scenario_, bus_.commands.back().leg);
+    if (!bus_.truth.empty()) over += fmt::format(", the ports {:.2f} m apart", bus_.truth.back().range_m());
     if (docks && t_contact_ns_)
-        gate.reason += bus_.first_report(DynamicsPhase::crashed) ? ", it crashed"
-                       : scenario_.gear                          ? ", it came to no rest"
-                                                                 : ", after a contact that bounced";
+        over += bus_.first_report(DynamicsPhase::crashed) ? ", it crashed"
+                : scenario_.gear                          ? ", it came to no rest"
+                                                          : ", after a contact that bounced";
+    if (gave_up) gate.details.push_back(over);
+    if (!gave_up) gate.reason = over;
 }
 
 void Judge::judge_duration(GateResult& gate) const {

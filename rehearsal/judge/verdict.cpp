@@ -83,6 +83,7 @@ json gate_json(const GateResult& g) {
             {"asked", g.asked},
             {"state", std::string(kGateStates[static_cast<std::size_t>(g.state)])},
             {"reason", g.reason},
+            {"details", g.details},
             {"margin", number_or_null(g.margin)},
             {"unit", g.unit},
             {"t_first_s", number_or_null(g.t_first_s)},
@@ -116,12 +117,19 @@ json to_json(const Distribution& d) {
             {"p90", d.p90},     {"p99", d.p99},   {"p99.9", d.p999},  {"max", d.max}};
 }
 
+std::string full_reason(const GateResult& gate) {
+    std::string text = gate.reason;
+    for (const std::string& detail : gate.details) text += "; " + detail;
+    return text;
+}
+
 json to_json(const Verdict& v) {
     json gates = json::array();
     for (const GateResult& g : v.gates) gates.push_back(gate_json(g));
     const NavigationStatistics& n = v.navigation;
     const LedgerStatistics& l = v.ledger;
     return {{"passed", v.passed},
+            {"outcome", v.outcome},
             {"headline", v.headline},
             {"t_end_s", v.t_end_s},
             {"mode", v.lockstep ? "lockstep" : "real time"},

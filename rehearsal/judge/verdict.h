@@ -35,7 +35,8 @@ struct GateResult {
     std::string name{};   ///< "corridor", for machines
     std::string asked{};  ///< the requirement, for people
     GateState state = GateState::not_judged;
-    std::string reason{};                            ///< for people, with times and numbers
+    std::string reason{};  ///< for people, one line: of a failed gate, the limit that was exceeded first
+    std::vector<std::string> details{};              ///< further findings, a line each
     std::optional<double> margin{};                  ///< at the worst sample; negative: violated by so much
     std::string unit{};                              ///< of the margin
     std::optional<double> t_first_s{}, t_worst_s{};  ///< of the first violation; of the worst sample
@@ -66,8 +67,9 @@ struct LedgerStatistics {
 
 struct Verdict {
     bool passed = false;
-    std::string headline;
-    double t_end_s = 0;  ///< of the last pose
+    std::string outcome;   ///< "Docked after 93.1 s, but gate navigation failed"
+    std::string headline;  ///< the same with the gate's reason
+    double t_end_s = 0;    ///< of the last pose
     bool lockstep = false;
     std::vector<GateResult> gates;
     std::optional<Contact> contact;
@@ -75,6 +77,9 @@ struct Verdict {
     LedgerStatistics ledger;
     std::uint64_t poses = 0, estimates = 0, commands = 0, heartbeats = 0, refused = 0, late = 0;
 };
+
+/// The reason and the details, with "; " between them.
+[[nodiscard]] std::string full_reason(const GateResult& gate);
 
 [[nodiscard]] nlohmann::json to_json(const Verdict& verdict);
 [[nodiscard]] nlohmann::json to_json(const Distribution& d);

@@ -185,7 +185,7 @@ std::string junit(const Verdict& verdict, const std::string& suite, double wall_
                          {"state", kGateStates[static_cast<std::size_t>(g.state)]},
                          {"type", "gate"},
                          {"reason", g.reason},
-                         {"text", g.state == GateState::passed ? asked + "; " + g.reason : asked}});
+                         {"text", asked + "; " + full_reason(g)}});
     }
     return junit(suite, wall_s, cases);
 }

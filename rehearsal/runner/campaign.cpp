@@ -64,6 +64,37 @@ ChildProcess::Command command_for(const CampaignOptions& o, const std::string& f
     return c;
 }
 
+bool is_interrupted(const json& result) {
+    return result.value("trouble", json("")) == "interrupted";
+}
+
+/// An Error for the first run that was flown with another scenario or seed.
+Status check_flown(const CampaignOptions& o, const Scenario& scenario, const std::string& hash,
+                   const std::vector<RunResult>& runs) {
+    for (const RunResult& run : runs) {
+        const json& result = run.result;
+        if (!result.is_object() || is_interrupted(result)) continue;
+        const std::string folder = o.run.folder + "/" + run.folder;
+        if (result.value("seed", json()) != run.seed)
+            return Error{fmt::format("was flown with seed {}, expected {}; --replace flies it again",
+                                     result.value("seed", json()).dump(), run.seed),
+                         folder};
+        if (result.value("scenario_hash", json()) == hash) continue;
+        const auto difference = difference_from_flown(folder, scenario);
+        if (!difference) return difference.error();
+        if (*difference == "[gates]")
+            return Error{fmt::format("was flown with other [gates]: `narpa judge {} --gates {}` judges what was "
+                                     "flown, --replace flies it again",
+                                     o.run.folder, scenario.file),
+                         folder};
+        return Error{fmt::format("was flown with another scenario ({} differ): expected a new folder, or --replace "
+                                 "to fly it again",
+                                 difference->empty() ? "[scenario]" : *difference),
+                     folder};
+    }
+    return Ok{};
+}
+
 struct Running {
     std::size_t run;
     ChildProcess child;
@@ -84,7 +115,7 @@ RunProgress progress_of(const std::string& log) {
 bool is_done(const std::string& folder, const std::string& scenario_hash, std::uint64_t seed) {
     const json result = read_json(folder + "/result.json");
     return result.is_object() && result.value("scenario_hash", json()) == scenario_hash &&
-           result.value("seed", json()) == seed && result.value("trouble", json("")) != "interrupted";
+           result.value("seed", json()) == seed && !is_interrupted(result);
 }
 
 Result<json> run_campaign(const CampaignOptions& o, const Console& console, const StopFlag& stop) {
@@ -100,13 +131,13 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     if (!scenario) return scenario.error();
     const auto texts = scenario_texts(*scenario);
     if (!texts) return texts.error();
-    const auto lock = claim_folder(o.run.folder, "runs");
+    const auto lock = claim_folder(o.run.folder, FolderKind::campaign);
     if (!lock) return lock.error();
+    std::vector<RunResult> runs = campaign_runs(o.run.folder, o.runs, o.run.seed.value_or(scenario->seed));
+    if (!o.replace)
+        if (Status good = check_flown(o, *scenario, texts->hash, runs); !good) return good.error();
     std::error_code failed;
     fs::create_directories(o.run.folder + "/runs", failed);
-    const std::uint64_t first_seed = o.run.seed.value_or(scenario->seed);
-    std::vector<RunResult> runs;
-    for (std::size_t k = 1; k <= o.runs; ++k) runs.push_back({k, first_seed + k - 1, run_folder(k), nullptr});
 
     const auto folder_of = [&](const RunResult& r) { return o.run.folder + "/" + r.folder; };
     std::size_t next = 0, done = 0;
@@ -155,18 +186,29 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     }
 
     for (RunResult& r : runs)
-        if (is_done(folder_of(r), texts->hash, r.seed)) r.result = read_json(folder_of(r) + "/result.json");
-    json summary = summarise(*scenario, runs);
-    summary["scenario_hash"] = texts->hash;
-    summary["version"] = o.run.version;
-    const std::string page = o.run.folder + "/index.html";
-    if (Status good = write_file(o.run.folder + "/junit.xml", campaign_junit(scenario->name, runs)); !good)
+        r.result = is_done(folder_of(r), texts->hash, r.seed) ? read_json(folder_of(r) + "/result.json") : nullptr;
+    return write_summary(o.run.folder, *scenario, runs,
+                         {{"scenario_hash", texts->hash}, {"version", o.run.version}});
+}
+
+std::vector<RunResult> campaign_runs(const std::string& folder, std::size_t runs, std::uint64_t first_seed) {
+    std::vector<RunResult> all;
+    for (std::size_t k = 1; k <= runs; ++k)
+        all.push_back(
+            {k, first_seed + k - 1, run_folder(k), read_json(folder + "/" + run_folder(k) + "/result.json")});
+    return all;
+}
+
+Result<json> write_summary(const std::string& folder, const Scenario& scenario, const std::vector<RunResult>& runs,
+                           const json& facts) {
+    json summary = summarise(scenario, runs);
+    summary.update(facts);
+    if (Status good = write_file(folder + "/junit.xml", campaign_junit(scenario.name, runs)); !good)
         return good.error();
-    if (Status good = write_file(o.run.folder + "/summary.json", summary.dump(2) + "\n"); !good)
+    if (Status good = write_file(folder + "/summary.json", summary.dump(2) + "\n"); !good) return good.error();
+    if (Status good = draw_charts(folder, campaign_plot(scenario, contacts_of(runs))); !good) return good.error();
+    if (Status good = write_file(folder + "/index.html", campaign_page(scenario, summary, folder)); !good)
         return good.error();
-    if (Status good = draw_charts(o.run.folder, campaign_plot(*scenario, contacts_of(runs))); !good)
-        return good.error();
-    if (Status good = write_file(page, campaign_page(*scenario, summary, o.run.folder)); !good) return good.error();
     return summary;
 }
 

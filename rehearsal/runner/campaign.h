@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "base/stop.h"
@@ -17,11 +18,21 @@ struct CampaignOptions {
     RehearsalOptions run;    ///< options of each run; seed: that of run 1, run k has that + k - 1
     std::size_t runs = 100;  ///< each in FOLDER/runs/0001 ...
     int jobs = 1;            ///< runs in parallel
+    bool replace = false;    ///< flies runs again that were flown with another scenario or seed
 };
 
 /// Starts `narpa rehearse` for each run that has no result of this scenario and seed yet, and summarises all in the
-/// folder: summary.json, junit.xml, index.html. Returns the document of summary.json.
+/// folder: summary.json, junit.xml, index.html. Returns the document of summary.json. An Error, before anything is
+/// written, if a run was flown with another scenario or seed and is not to be replaced.
 Result<nlohmann::json> run_campaign(const CampaignOptions& options, const Console& console, const StopFlag& stop);
+
+/// The runs 1 to `runs` of a campaign, with the results that there are.
+[[nodiscard]] std::vector<RunResult> campaign_runs(const std::string& folder, std::size_t runs,
+                                                   std::uint64_t first_seed);
+/// Summarises runs and writes summary.json, junit.xml, the charts and index.html. `facts`: further keys of the
+/// summary, which is returned.
+Result<nlohmann::json> write_summary(const std::string& folder, const Scenario& scenario,
+                                     const std::vector<RunResult>& runs, const nlohmann::json& facts);
 
 /// Progress of a run.
 struct RunProgress {

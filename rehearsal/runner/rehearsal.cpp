@@ -16,10 +16,10 @@
 #include "base/write_file.h"
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/judge/judge.h"
-#include "rehearsal/report/run_report.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/free_port.h"
 #include "rehearsal/runner/run_folder.h"
+#include "rehearsal/runner/run_results.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -47,16 +47,14 @@ std::string utc_now() {
     return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc)};
 }
 
-/// write_file, with the system's reason in the Error.
-Status write_whole(const std::string& file, const std::string& text) {
-    errno = 0;
-    Status written = write_file(file, text);
-    if (written || errno == 0) return written;
-    return Error{fmt::format("cannot be written: {}", std::strerror(errno)), file, 0, 0, ErrorKind::failed};
+std::string whole_path(const std::string& path) {
+    return fs::absolute(path).lexically_normal().string();
 }
 
-void keep_first(Status& first, const Status& next) {
-    if (first && !next) first = next;
+/// As soon as it has failed; the reason follows with the verdict.
+std::string live_text(const GateResult& gate) {
+    return fmt::format("gate {} failed", gate.name) +
+           (gate.t_first_s ? fmt::format(" at t = {:.2f} s", *gate.t_first_s) : std::string());
 }
 
 class Rehearsal {
@@ -130,7 +128,7 @@ private:
     }
 
     Status prepare_folder() {
-        auto lock = claim_folder(options_.folder, "rehearsal.json");
+        auto lock = claim_folder(options_.folder, FolderKind::run);
         if (!lock) return lock.error();
         lock_ = *std::move(lock);
         std::error_code failed;
@@ -297,8 +295,9 @@ private:
 
     Status write_record() {
         record_ = {{"format", 1},
-                   {"scenario", fs::absolute(scenario_.file).lexically_normal().string()},
-                   {"scene", fs::absolute(scenario_.scene).lexically_normal().string()},
+                   {"scenario", whole_path(scenario_.file)},
+                   {"scene", whole_path(scenario_.scene)},
+                   {"map", scenario_.navigation.scene.empty() ? "" : whole_path(scenario_.navigation.scene)},
                    {"scenario_hash", hash_},
                    {"mode", options_.real_time ? "real time" : "lockstep"},
                    {"seed", seed()},
@@ -405,27 +404,11 @@ private:
     // --- Afterwards ---
 
     Result<RehearsalResult> write_results() {
-        RehearsalResult done;
-        done.wall_s = seconds_since(began_);
-        done.verdict = judge_.finish(trouble_);
-        const Verdict& v = done.verdict;
-        done.result = to_json(v);
-        done.result.update({{"scenario", scenario_.name},
-                            {"scenario_hash", hash_},
-                            {"seed", seed()},
-                            {"version", options_.version},
-                            {"trouble", trouble_}});
-        // The verdict is written first: on a full disk the rest may have no room.
-        keep_first(done.written, write_whole(in_folder("result.json"), done.result.dump(2) + "\n"));
-        keep_first(done.written, write_whole(in_folder("junit.xml"), junit(v, scenario_.name, done.wall_s)));
-        if (!options_.page) return done;
-        record_["wall_s"] = done.wall_s;
-        keep_first(done.written, draw_charts(options_.folder, rehearsal_plot(scenario_, judge_.bus(), v)));
-        const std::string page = in_folder("index.html");
-        const Status paged =
-            write_whole(page, rehearsal_page(scenario_, judge_.bus(), v, record_, options_.folder));
-        if (paged) done.page = page;
-        keep_first(done.written, paged);
+        record_["wall_s"] = seconds_since(began_);
+        record_["trouble"] = trouble_;
+        RehearsalResult done =
+            narpa::rehearsal::write_results(scenario_, judge_, record_, options_.folder, options_.page);
+        keep_first(done.written, write_whole(in_folder("rehearsal.json"), record_.dump(2) + "\n"));
         return done;
     }
 
@@ -433,8 +416,7 @@ private:
     const Console& console_;
     const StopFlag& stop_;
     const Scenario scenario_;
-    Judge judge_{scenario_,
-                 [this](const GateResult& g) { console_.print(fmt::format("gate {}: {}", g.name, g.reason)); }};
+    Judge judge_{scenario_, [this](const GateResult& g) { console_.print(live_text(g)); }};
     const double nominal_s_ = scenario_.nominal_duration_s();
     const Clock::time_point began_ = Clock::now();
     std::vector<std::pair<Clock::time_point, double>> marks_;  ///< wall time and simulation time

@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 #include <sys/file.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <map>
 
+#include "base/fnv1a.h"
 #include "base/write_file.h"
 #include "renderer/keys/toml_file.h"
 
@@ -17,11 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// G. Fowler, L. Noll, K.-P. Vo: FNV-1a, 64 bits.
-std::uint64_t fnv1a(std::string_view text, std::uint64_t hash = 0xcbf29ce484222325ULL) {
-    for (const char c : text) hash = (hash ^ static_cast<std::uint8_t>(c)) * 0x100000001b3ULL;
-    return hash;
-}
+/// What only the folder of a run and that of a campaign have, in the order of FolderKind.
+constexpr std::array<const char*, 2> kMarks{"rehearsal.json", "runs"};
 
 }  // namespace
 
@@ -41,6 +41,23 @@ Result<ScenarioTexts> scenario_texts(const Scenario& scenario) {
     return texts;
 }
 
+Result<std::string> difference_from_flown(const std::string& folder, const Scenario& scenario) {
+    const auto flown = TomlFile::read(folder + "/scenario.toml", "scenario");
+    if (!flown) return flown.error();
+    const auto now = TomlFile::read(scenario.file, "scenario");
+    if (!now) return now.error();
+    const auto texts = scenario_texts(scenario);
+    if (!texts) return texts.error();
+    std::vector<std::string> differ;
+    std::map<std::string, std::string> a = flown->tables(), b = now->tables();
+    a.merge(std::map(b));
+    for (const auto& [name, text] : a)
+        if (name != "scenario" && flown->tables()[name] != b[name]) differ.push_back("[" + name + "]");
+    if (read_text(folder + "/scene.toml") != texts->scene) differ.emplace_back("the scene");
+    if (!texts->map.empty() && read_text(folder + "/map.toml") != texts->map) differ.emplace_back("the map");
+    return fmt::format("{}", fmt::join(differ, ", "));
+}
+
 Result<Descriptor> lock_folder(const std::string& folder) {
     std::error_code failed;
     fs::create_directories(folder, failed);
@@ -53,17 +70,29 @@ Result<Descriptor> lock_folder(const std::string& folder) {
     return lock;
 }
 
-Result<Descriptor> claim_folder(const std::string& folder, const char* mark) {
+Result<FolderKind> kind_of_folder(const std::string& folder) {
+    std::error_code failed;
+    for (std::size_t k = 0; k < kMarks.size(); ++k)
+        if (fs::exists(folder + "/" + kMarks[k], failed)) return static_cast<FolderKind>(k);
+    return Error{fmt::format("holds neither {} nor {}, expected the folder of a rehearsal or of a campaign",
+                             kMarks[0], kMarks[1]),
+                 folder};
+}
+
+Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind) {
     auto lock = lock_folder(folder);
     if (!lock) return lock;
     std::error_code failed;
     const bool empty = fs::is_empty(folder, failed);
     if (failed) return Error{"cannot be read: " + failed.message(), folder};
-    if (!empty && !fs::exists(folder + "/" + mark, failed))
-        return Error{
-            fmt::format("holds other files and no {}, expected a new or empty folder, or a rehearsal's", mark),
-            folder};
-    return lock;
+    const auto held = kind_of_folder(folder);
+    if (empty || (held && *held == kind)) return lock;
+    const char* const is = !held                           ? "holds other files"
+                           : *held == FolderKind::campaign ? "holds a campaign"
+                                                           : "holds a single run";
+    return Error{fmt::format("{}, expected a new or empty folder, or that of {}", is,
+                             kind == FolderKind::campaign ? "a campaign" : "a single run"),
+                 folder};
 }
 
 }  // namespace narpa::rehearsal

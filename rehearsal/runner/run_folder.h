@@ -1,6 +1,7 @@
 /// rehearsal/runner/run_folder.h - the folder that a rehearsal or a campaign writes into.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "base/result.h"
@@ -11,8 +12,13 @@ namespace narpa::rehearsal {
 
 /// Creates the folder and locks it until the descriptor closes; an Error if another program has locked it.
 Result<Descriptor> lock_folder(const std::string& folder);
-/// The same for a folder that is empty or contains `mark`; an Error if it holds other files.
-Result<Descriptor> claim_folder(const std::string& folder, const char* mark);
+/// What a folder of results holds.
+enum class FolderKind : std::uint8_t { run, campaign };
+
+/// The same for a folder that is empty or of this kind; an Error if it holds other files.
+Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind);
+/// Whether a folder holds a campaign; an Error if it holds no results.
+Result<FolderKind> kind_of_folder(const std::string& folder);
 
 /// Scenario, scene and the navigation's map, each with everything it is based on, as one TOML text, and a hash of
 /// all as 16 hexadecimal digits. Without a map its text is empty.
@@ -20,5 +26,9 @@ struct ScenarioTexts {
     std::string scenario, scene, map, hash;
 };
 Result<ScenarioTexts> scenario_texts(const Scenario& scenario);
+
+/// How what was flown in a run's folder differs from `scenario`: "[gates]", "[chaser], the scene"; empty: it does
+/// not. `[scenario]` is not compared. An Error if the folder's scenario.toml cannot be read.
+Result<std::string> difference_from_flown(const std::string& folder, const Scenario& scenario);
 
 }  // namespace narpa::rehearsal

@@ -201,7 +201,12 @@ struct Scenario {
 /// The tables of a scenario file.
 extern const TableKeys kScenarioFileKeys;
 
+/// Files in place of those that a scenario names; empty: its own.
+struct ScenarioFiles {
+    std::string scene{}, map{};
+};
+
 /// Errors name file, line, column, what is wrong and what was expected.
-Result<Scenario> read_scenario(const std::string& path);
+Result<Scenario> read_scenario(const std::string& path, const ScenarioFiles& files = {});
 
 }  // namespace narpa::rehearsal

@@ -52,7 +52,7 @@ std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problem
     const FilePlace place = table->place("scene");
     table->finish();
     if (!scene) return std::nullopt;
-    s.scene = beside(place.file, *scene);
+    if (s.scene.empty()) s.scene = beside(place.file, *scene);
     if (std::error_code error; !std::filesystem::exists(s.scene, error)) {
         problems.add(place, "scene: " + s.scene + ": no such file");
         return std::nullopt;
@@ -78,9 +78,11 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
 
 constinit const TableKeys kScenarioFileKeys{.rows = kScenarioFileRows};
 
-Result<Scenario> read_scenario(const std::string& path) {
+Result<Scenario> read_scenario(const std::string& path, const ScenarioFiles& files) {
     Scenario s;
     s.file = path;
+    s.scene = files.scene;
+    s.navigation.scene = files.map;
     Problems problems(path);
     const auto file = TomlFile::read(path, "scenario");
     if (!file) return file.error();

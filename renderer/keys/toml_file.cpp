@@ -96,6 +96,16 @@ std::string TomlFile::text() const {
     return text.str();
 }
 
+std::map<std::string, std::string> TomlFile::tables() const {
+    std::map<std::string, std::string> tables;
+    for (const auto& [name, node] : *table_) {
+        std::ostringstream text;
+        node.visit([&](const auto& value) { text << value; });
+        tables.emplace(name.str(), text.str());
+    }
+    return tables;
+}
+
 std::set<std::string> TomlFile::files() const {
     std::set<std::string> files;
     visit_values(*table_, [&](const toml::node& node) {

@@ -1,6 +1,7 @@
 /// renderer/keys/toml_file.h - TOML files, which may hold only their differences from another.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -29,6 +30,8 @@ public:
     }
     /// What the files say together.
     [[nodiscard]] std::string text() const;
+    /// The same for each table and array of tables at the top, by its name.
+    [[nodiscard]] std::map<std::string, std::string> tables() const;
     /// The files that hold the values.
     [[nodiscard]] std::set<std::string> files() const;
     /// Every text among the values.

@@ -35,10 +35,10 @@ TEST(JudgeBus, ALogGivesTheSameVerdict) {
         file.write(line.data(), static_cast<std::streamsize>(format_candump({m.ns(3), f}, "narpa", line)));
     }
     file.close();
-    const auto logged = judge_log(s, path);
-    ASSERT_TRUE(logged);
-    EXPECT_EQ(to_json(*logged).dump(), to_json(live).dump());
-    EXPECT_FALSE(judge_log(s, folder / "none.log"));
+    Judge logged(s);
+    ASSERT_TRUE(accept_log(logged, path));
+    EXPECT_EQ(to_json(logged.finish()).dump(), to_json(live).dump());
+    EXPECT_FALSE(accept_log(logged, folder / "none.log"));
 }
 
 /// The hub passes a client's frames on before it answers them; its own log has them in another order.
@@ -59,7 +59,7 @@ TEST(JudgeBus, NamesTheMissingSender) {
         last(m);
         const Verdict v = judge(s, m);
         EXPECT_EQ(gate(v, "complete").state, GateState::failed);
-        return gate(v, "complete").reason;
+        return full_reason(gate(v, "complete"));
     };
     EXPECT_NE(reason([&](Messages& m) {
                   m.report(1);

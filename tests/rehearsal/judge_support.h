@@ -138,13 +138,4 @@ inline const GateResult& gate(const Verdict& v, const std::string& name) {
     return none;
 }
 
-/// The verdict on a candump log.
-inline Result<Verdict> judge_log(const Scenario& scenario, const std::string& path) {
-    auto log = open_can_bus("log:" + path, CanRole::hub);
-    if (!log) return log.error();
-    Judge judge(scenario);
-    for (ReceivedFrame received; (*log)->receive(received);) judge.accept(received.frame, received.t_received_ns);
-    return judge.finish();
-}
-
 }  // namespace narpa::rehearsal

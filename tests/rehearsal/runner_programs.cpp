@@ -177,14 +177,17 @@ TEST(LidarPort, LeavesRoomForPositionPackets) {
 
 TEST(Folder, WithOtherFilesIsNotClaimed) {
     const test::TemporaryFolder folder;
-    EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
-    EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
+    EXPECT_TRUE(claim_folder(folder / "new", FolderKind::run));
+    EXPECT_TRUE(claim_folder(folder / "new", FolderKind::run));
     std::ofstream(folder / "new/letter.txt") << "dear";
-    const auto other = claim_folder(folder / "new", "rehearsal.json");
+    const auto other = claim_folder(folder / "new", FolderKind::run);
     ASSERT_FALSE(other);
     EXPECT_NE(other.error().what.find("holds other files"), std::string::npos);
     std::ofstream(folder / "new/rehearsal.json") << "{}";
-    EXPECT_TRUE(claim_folder(folder / "new", "rehearsal.json"));
+    EXPECT_TRUE(claim_folder(folder / "new", FolderKind::run));
+    const auto campaign = claim_folder(folder / "new", FolderKind::campaign);
+    ASSERT_FALSE(campaign);
+    EXPECT_NE(campaign.error().what.find("holds a single run, expected"), std::string::npos);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "rehearsal/runner/campaign.h"
 #include "rehearsal/runner/child_process.h"
 #include "rehearsal/runner/rehearsal.h"
+#include "rehearsal/runner/rejudge.h"
 #include "rehearsal/runner/rerun.h"
 #include "rehearsal/runner/run_folder.h"
 #include "tests/rehearsal/judge_support.h"
@@ -68,9 +69,9 @@ TEST_F(Whole, WritesAllFilesAndRepeatsByteForByte) {
 
     // The live verdict equals that of the emulator's log; whether the first heartbeat was received is chance.
     const auto scenario = read_scenario(o.scenario);
-    const auto logged = judge_log(*scenario, o.folder + "/emulator/can.log");
-    ASSERT_TRUE(logged);
-    nlohmann::json live = to_json(v), log = to_json(*logged);
+    Judge judge(*scenario);
+    ASSERT_TRUE(accept_log(judge, o.folder + "/emulator/can.log"));
+    nlohmann::json live = to_json(v), log = to_json(judge.finish());
     live["bus"].erase("heartbeats"), log["bus"].erase("heartbeats");
     EXPECT_EQ(live, log);
 
@@ -94,8 +95,8 @@ TEST_F(Whole, NamesAProgramThatEndsTooSoon) {
     EXPECT_FALSE(done->verdict.passed);
     EXPECT_EQ(done->verdict.headline, "Flown for 0.0 s, but the navigation ended with status 7: out of fuel")
         << done->verdict.headline;
-    EXPECT_NE(gate(done->verdict, "complete").reason.find("; the run broke off: "), std::string::npos)
-        << gate(done->verdict, "complete").reason;
+    EXPECT_NE(full_reason(gate(done->verdict, "complete")).find("; the run broke off: "), std::string::npos)
+        << full_reason(gate(done->verdict, "complete"));
     EXPECT_TRUE(fs::exists(o.folder + "/index.html"));
 }
 
@@ -106,7 +107,7 @@ TEST_F(Whole, EndsAfterTooLongWithoutProgress) {
     ASSERT_TRUE(done) << done.error().text();
     EXPECT_NE(done->verdict.headline.find("but nothing moved for 0.3 s"), std::string::npos)
         << done->verdict.headline;
-    EXPECT_NE(gate(done->verdict, "complete").reason.find("the dynamics sent nothing"), std::string::npos);
+    EXPECT_NE(full_reason(gate(done->verdict, "complete")).find("the dynamics sent nothing"), std::string::npos);
 }
 
 TEST_F(Whole, AStatusOfTheUsersNavigationIsNoneOfOurs) {
@@ -270,7 +271,64 @@ TEST_F(Whole, ASecondRunIntoTheSameFolderIsRefused) {
                                           "of its own for each");
     EXPECT_EQ(exit_status(second->error().kind), 2);
     EXPECT_TRUE(fs::exists(o.folder + "/result.json")) << "the first is left alone";
-    EXPECT_TRUE(claim_folder(o.folder, "rehearsal.json")) << "and is unlocked at its end";
+    EXPECT_TRUE(claim_folder(o.folder, FolderKind::run)) << "and is unlocked at its end";
+}
+
+nlohmann::json result_in(const std::string& run) {
+    nlohmann::json result = nlohmann::json::parse(read_text(run + "/result.json"));
+    result["bus"].erase("heartbeats");  // whether the first one was received is chance
+    return result;
+}
+
+/// The flown scenario, with other gates.
+std::string scenario_with(const test::TemporaryFolder& folder, const std::string& name, const std::string& tables) {
+    std::ofstream(folder / name) << "[scenario]\nbased_on = \"short.toml\"\n" << tables;
+    return folder / name;
+}
+
+TEST_F(Whole, IsJudgedAnewByOtherGates) {
+    o.folder = folder / "campaign/runs/0001";
+    const auto flown = run_rehearsal(o, kSilent, stop);
+    ASSERT_TRUE(flown) << flown.error().text();
+    ASSERT_EQ(gate(flown->verdict, "navigation").state, GateState::passed);
+    const std::string log = read_text(o.folder + "/emulator/can.log");
+    const nlohmann::json result = result_in(o.folder);
+
+    const std::string strict = scenario_with(folder, "strict.toml", "[gates.navigation]\nposition_m = 1e-6\n");
+    const auto judged = judge_run(o.folder, strict);
+    ASSERT_TRUE(judged) << judged.error().text();
+    EXPECT_TRUE(judged->written);
+    EXPECT_EQ(gate(judged->verdict, "navigation").state, GateState::failed);
+    EXPECT_EQ(result_in(o.folder)["judged_by"], strict);
+    EXPECT_EQ(markup_error(read_text(o.folder + "/index.html")), "");
+    ASSERT_TRUE(judge_run(o.folder, ""));
+    EXPECT_EQ(result_in(o.folder), result) << "by the gates that were flown with";
+    EXPECT_EQ(read_text(o.folder + "/emulator/can.log"), log);
+
+    const std::string other = scenario_with(folder, "other.toml", "[control]\nbandwidth_rad_s = 0.09\n");
+    const auto refused = judge_run(o.folder, other);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().what.find("([control] differ)"), std::string::npos) << refused.error().text();
+
+    // A campaign keeps what was flown.
+    o.folder = folder / "campaign";
+    const auto campaign = [&](const std::string& scenario, std::uint64_t seed) {
+        o.scenario = scenario;
+        o.seed = seed;
+        const auto done = run_campaign({o, 1, 1}, kSilent, stop);
+        return done ? std::string() : done.error().what;
+    };
+    EXPECT_NE(campaign(strict, 1).find("`narpa judge " + o.folder + " --gates " + strict + "`"), std::string::npos);
+    EXPECT_NE(campaign(other, 1).find("([control] differ)"), std::string::npos);
+    EXPECT_NE(campaign(folder / "short.toml", 7).find("was flown with seed 1, expected 7"), std::string::npos);
+    EXPECT_EQ(read_text(o.folder + "/runs/0001/emulator/can.log"), log);
+    EXPECT_EQ(campaign(folder / "short.toml", 1), "") << "there is nothing to fly";
+    EXPECT_EQ(read_text(o.folder + "/runs/0001/emulator/can.log"), log);
+
+    const auto summary = judge_campaign(o.folder, strict, kSilent);
+    ASSERT_TRUE(summary) << summary.error().text();
+    EXPECT_EQ((*summary)["failures"]["navigation"].size(), 1u) << summary->dump(1);
+    EXPECT_EQ((*summary)["judged_by"], strict);
 }
 
 TEST_F(Whole, ACampaignShowsHowFarARunIs) {

@@ -1,0 +1,108 @@
+#include "rehearsal/runner/rejudge.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "rehearsal/runner/campaign.h"
+#include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/rerun.h"
+#include "rehearsal/runner/run_folder.h"
+#include "rehearsal/runner/run_results.h"
+#include "renderer/keys/toml_file.h"
+
+namespace narpa::rehearsal {
+namespace {
+
+using nlohmann::json;
+
+json document(const std::string& file) {
+    json read = json::parse(read_text(file), nullptr, false);
+    return read.is_discarded() ? json(nullptr) : read;
+}
+
+/// The scenario that was flown, from the copy in the folder.
+Result<Scenario> flown_scenario(const std::string& folder, const json& record) {
+    auto scenario = read_scenario(folder + "/scenario.toml", {record.value("scene", ""), record.value("map", "")});
+    if (!scenario) return scenario;
+    const auto scene = TomlFile::read(scenario->scene, "scene");
+    if (!scene) return scene.error();
+    if (scene->text() + '\n' != read_text(folder + "/scene.toml"))
+        return Error{fmt::format("has changed since it was flown, expected what stands in {}/scene.toml", folder),
+                     scenario->scene};
+    return scenario;
+}
+
+/// Replaces the gates by those of another file of the same scenario.
+Status take_gates(const std::string& folder, const std::string& file, Scenario& flown) {
+    auto other = read_scenario(file);
+    if (!other) return other.error();
+    const auto difference = difference_from_flown(folder, *other);
+    if (!difference) return difference.error();
+    if (!difference->empty() && *difference != "[gates]")
+        return Error{
+            fmt::format("is not the scenario that was flown into {} ({} differ), expected other [gates] and "
+                        "duration_s at most",
+                        folder, *difference),
+            file};
+    flown.gates = std::move(other->gates);
+    flown.duration_s = other->duration_s;
+    return Ok{};
+}
+
+}  // namespace
+
+Result<RehearsalResult> judge_run(const std::string& folder, const std::string& gates) {
+    const auto lock = lock_folder(folder);
+    if (!lock) return lock.error();
+    auto record = read_record(folder);
+    if (!record) return record.error();
+    auto scenario = flown_scenario(folder, *record);
+    if (!scenario) return scenario.error();
+    if (!gates.empty())
+        if (Status taken = take_gates(folder, gates, *scenario); !taken) return taken.error();
+    Judge judge(*scenario);
+    if (Status read = accept_log(judge, folder + "/emulator/can.log"); !read) return read.error();
+    const json before = document(folder + "/result.json");
+    if (!record->contains("wall_s")) (*record)["wall_s"] = 0.0;
+    if (!record->contains("trouble")) (*record)["trouble"] = before.is_object() ? before.value("trouble", "") : "";
+    if (!record->contains("version")) (*record)["version"] = "";
+    if (!gates.empty()) (*record)["judged_by"] = gates;
+    return write_results(*scenario, judge, *record, folder, true);
+}
+
+Result<json> judge_campaign(const std::string& folder, const std::string& gates, const Console& console) {
+    const auto lock = claim_folder(folder, FolderKind::campaign);
+    if (!lock) return lock.error();
+    json facts = document(folder + "/summary.json");
+    if (!facts.is_object() || !facts.contains("runs") || !facts.contains("each") || facts["each"].empty())
+        return Error{
+            "holds no summary of runs, expected a campaign that has ended: the same `narpa rehearse` command "
+            "goes on with it",
+            folder};
+    const std::size_t wanted = facts["runs"];
+    const std::uint64_t first_seed =
+        facts["each"][0]["seed"].get<std::uint64_t>() - facts["each"][0]["run"].get<std::uint64_t>() + 1;
+    std::vector<RunResult> runs = campaign_runs(folder, wanted, first_seed);
+    std::string last;
+    for (RunResult& run : runs) {
+        console.progress(static_cast<double>(run.run - 1) / static_cast<double>(wanted), -1,
+                         fmt::format("run {} of {}", run.run, wanted));
+        if (!run.result.is_object()) continue;
+        last = folder + "/" + run.folder;
+        const auto judged = judge_run(last, gates);
+        if (!judged) return judged.error();
+        if (!judged->written) return judged->written.error();
+        run.result = judged->result;
+    }
+    const auto record = read_record(last);
+    if (!record) return record.error();
+    const auto scenario = flown_scenario(last, *record);
+    if (!scenario) return scenario.error();
+    json kept{{"scenario_hash", facts["scenario_hash"]}, {"version", facts["version"]}};
+    if (!gates.empty()) kept["judged_by"] = gates;
+    return write_summary(folder, *scenario, runs, kept);
+}
+
+}  // namespace narpa::rehearsal

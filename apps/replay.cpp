@@ -121,6 +121,8 @@ Outcome replay_camera(const ReplayOptions& o) {
     if (!run) return run.error();
     const std::string& camera = (*run)->camera().name;
     const std::string log = o.folder + "/" + camera + ".ledger.csv";
+    for (const std::string& file : (*run)->changed_files())
+        say(fmt::format("warning: {} is not what it was in the run", file));
     if ((*run)->frames().empty()) return Error{fmt::format("holds no frame of camera \"{}\"", camera), log};
 
     const Replayed done = render_again(o, **run);
@@ -139,6 +141,7 @@ Outcome replay_camera(const ReplayOptions& o) {
     nlohmann::json document{{"passed", passed},
                             {"log", o.folder},
                             {"camera", camera},
+                            {"changed_files", (*run)->changed_files()},
                             {"frames_logged", (*run)->frames().size()},
                             {"frames_replayed", done.frames.size()},
                             {"frames_not_whole", done.not_whole},

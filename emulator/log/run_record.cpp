@@ -4,15 +4,20 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "base/file_bytes.h"
+#include "base/fnv1a.h"
 #include "base/write_file.h"
+#include "renderer/keys/toml_file.h"
+#include "renderer/scene_file/scene_inputs.h"
 
 namespace narpa {
 namespace {
@@ -54,7 +59,50 @@ constexpr std::array<std::string_view, 7> kEndings{
     ".truth.csv", ".ledger.csv", ".estimate.csv", ".estimate.png", ".estimate.json", ".sweeps.csv", ".shots.csv"};
 constexpr std::string_view kLedgerEnding = kEndings[1];
 
+std::string absolute(const std::string& file) {
+    std::error_code unknown;
+    const std::filesystem::path whole = std::filesystem::absolute(file, unknown);
+    return unknown ? file : whole.lexically_normal().string();
+}
+
+/// Empty if the file cannot be read.
+std::optional<RecordedFile> recorded(const std::string& file) {
+    const auto content = read_file(file);
+    if (!content) return std::nullopt;
+    return RecordedFile{absolute(file), content->size(), fnv1a(*content)};
+}
+
+json recorded_files(const Scene& scene) {
+    json files = json::array();
+    for (const std::string& file : files_of(scene))
+        if (const auto f = recorded(file))
+            files.push_back(
+                {{"file", f->file}, {"size_b", f->size_b}, {"fnv1a", fmt::format("{:016x}", f->fnv1a)}});
+    return files;
+}
+
+bool is_file_list(const json& files) {
+    return files.is_array() && std::ranges::all_of(files, [](const json& f) {
+               return f.is_object() && f.contains("file") && f["file"].is_string() && f.contains("size_b") &&
+                      f["size_b"].is_number_unsigned() && f.contains("fnv1a") && f["fnv1a"].is_string();
+           });
+}
+
+std::vector<RecordedFile> file_list(const json& files) {
+    std::vector<RecordedFile> list;
+    for (const json& f : files)
+        list.push_back({f["file"], f["size_b"], std::strtoull(f["fnv1a"].get<std::string>().c_str(), nullptr, 16)});
+    return list;
+}
+
 }  // namespace
+
+std::vector<std::string> changed_files(const RunRecord& record) {
+    std::vector<std::string> changed;
+    for (const RecordedFile& file : record.files)
+        if (recorded(file.file) != file) changed.push_back(file.file);
+    return changed;
+}
 
 Status remove_run(const std::string& folder) {
     namespace fs = std::filesystem;
@@ -65,7 +113,7 @@ Status remove_run(const std::string& folder) {
         error.what += "; the folder's files stay, expected a new folder or that of a run";
         return error;
     }
-    std::vector<fs::path> files{fs::path(folder) / "can.log"};
+    std::vector<fs::path> files{fs::path(folder) / "can.log", fs::path(folder) / "scene.toml"};
     for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
         const std::string path = at->path();
         const auto is_of = [&](std::string_view ending) { return path.ends_with(ending); };
@@ -82,12 +130,14 @@ Status remove_run(const std::string& folder) {
 }
 
 Status write_run_record(const std::string& folder, const Scene& scene) {
-    std::error_code unknown;
-    const std::filesystem::path file = std::filesystem::absolute(scene.file, unknown);
+    const auto text = TomlFile::read(scene.file, "scene");
+    if (!text) return text.error();
+    if (Status written = write_file(folder + "/scene.toml", text->text() + '\n'); !written) return written;
     const RenderSettings& r = scene.render;
     const json document{
         {"format", kFormat},
-        {"scene", unknown ? scene.file : file.lexically_normal().string()},
+        {"scene", absolute(scene.file)},
+        {"files", recorded_files(scene)},
         {"render",
          {{"method", r.method == Method::path ? kPath : kDirect}, {"max_depth", r.max_depth}, {"seed", r.seed}}}};
     return write_file(file_in(folder), document.dump(2) + '\n');
@@ -112,17 +162,19 @@ Result<RunRecord> read_run_record(const std::string& folder) {
          {whole_number("/format", kFormat, kFormat),
           Key{"/scene", [](const json& v) { return v.is_string() && v != ""; }, "a name"},
           Key{"/render/method", [](const json& v) { return v == kDirect || v == kPath; }, "direct or path"},
+          Key{"/files", is_file_list, "an array of {file, size_b, fnv1a}"},
           whole_number("/render/max_depth", 1, 40),
           whole_number("/render/seed", 0, std::numeric_limits<std::uint64_t>::max())}) {
         const json::json_pointer pointer(at);
-        if (document.contains(pointer) && is_good(document.at(pointer))) continue;
+        if (document.contains(pointer) ? is_good(document.at(pointer)) : pointer.back() == "files") continue;
         const std::size_t found = text.find('"' + pointer.back() + '"');
         return error_at(file, text, found == std::string::npos ? 0 : found,
                         pointer.back() + ": expected " + expected);
     }
     const json& render = document["render"];
     return RunRecord{document["scene"], render["method"] == kPath ? Method::path : Method::direct,
-                     render["max_depth"], render["seed"]};
+                     render["max_depth"], render["seed"],
+                     document.contains("files") ? file_list(document["files"]) : std::vector<RecordedFile>()};
 }
 
 }  // namespace narpa

@@ -142,6 +142,7 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const st
     if (!placements) return placements.error();
     std::unique_ptr<Replay> replay(new Replay(*std::move(world), *index));
     replay->frames_ = *std::move(frames);
+    if (scene_file.empty()) replay->changed_files_ = narpa::changed_files(*record);
     replay->placements_ = std::move(placements->bodies);
     replay->poses_ = std::move(placements->cameras);
     return replay;

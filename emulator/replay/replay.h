@@ -33,6 +33,8 @@ public:
     static Result<std::unique_ptr<Replay>> open(const std::string& folder, const std::string& camera,
                                                 const std::string& scene_file);
 
+    /// Files of the scene that have changed since the run; empty for another scene than the run's.
+    [[nodiscard]] const std::vector<std::string>& changed_files() const noexcept { return changed_files_; }
     [[nodiscard]] const std::vector<LoggedFrame>& frames() const noexcept { return frames_; }
     [[nodiscard]] const World& world() const noexcept { return *world_; }
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
@@ -68,6 +70,7 @@ private:
     CameraSettings settings_;
     double full_scale_;
     std::vector<LoggedFrame> frames_;
+    std::vector<std::string> changed_files_;
     std::vector<BodyPoses> placements_;  ///< of each frame
     std::vector<CameraPose> poses_;
     CameraRenderer renderer_;

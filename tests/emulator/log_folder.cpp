@@ -62,14 +62,14 @@ TEST_F(LogFolder, HasNoFilesOfSensorsThatTheRunLacks) {
     RunOptions lidar = options();
     lidar.lidar = {{"top", "none"}};
     ran(scene(small_scene()), lidar);
-    EXPECT_EQ(names(),
-              (std::vector<std::string>{"can.log", "nav.y4m.png", "notes.csv", "run.json", "top.sweeps.csv"}));
+    EXPECT_EQ(names(), (std::vector<std::string>{"can.log", "nav.y4m.png", "notes.csv", "run.json", "scene.toml",
+                                                 "top.sweeps.csv"}));
     RunOptions unheard = of_both_sensors();
     unheard.bus.clear(), unheard.lidar.clear();
     unheard.lockstep = false, unheard.duration_s = 0.2;
     ran(scene(small_scene()), unheard);
     EXPECT_EQ(names(), (std::vector<std::string>{"nav.ledger.csv", "nav.png", "nav.truth.csv", "nav.y4m.png",
-                                                 "notes.csv", "run.json"}));
+                                                 "notes.csv", "run.json", "scene.toml"}));
 }
 
 TEST_F(LogFolder, FilesBesideARunJsonThatIsNoRunsStay) {

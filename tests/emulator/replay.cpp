@@ -275,6 +275,15 @@ TEST_F(ReplayTest, FindsPosesThatAreNotAsTheyWere) {
     EXPECT_FALSE(replay->make(1).empty());
 }
 
+TEST_F(ReplayTest, NamesTheFilesThatHaveChangedSinceTheRun) {
+    const std::string log = run(scene_with("spp = 2"), 2);
+    EXPECT_EQ(open(log)->changed_files(), std::vector<std::string>());
+    EXPECT_NE(read_text(log + "/scene.toml").find("[[camera]]"), std::string::npos);
+    const std::string scene = json::parse(read_text(log + "/run.json"))["scene"];
+    std::ofstream(scene, std::ios::app) << "# no change in meaning\n";
+    EXPECT_EQ(open(log)->changed_files(), std::vector<std::string>{scene});
+}
+
 TEST_F(ReplayTest, ErrorsOfALogNamePlaceAndCause) {
     expect_refused(folder_ / "nowhere", "run.json: is not there, expected the log folder of a run");
     const std::string log = run(scene_with("budget_rays = 20000"), 3);
@@ -321,7 +330,13 @@ TEST_F(ReplayTest, ErrorsOfALogNamePlaceAndCause) {
     expect_refused(log, "seed: expected a whole number from 0");
     std::ofstream(record_file) << good_record;
     tamper(record_file, "\"direct\"", "\"magic\"");
-    expect_refused(log, "run.json:5:5: method: expected direct or path");
+    const auto lines_before =
+        std::count(good_record.begin(),
+                   good_record.begin() + static_cast<std::ptrdiff_t>(good_record.find("\"method\"")), '\n');
+    expect_refused(log, fmt::format("run.json:{}:5: method: expected direct or path", lines_before + 1));
+    std::ofstream(record_file) << good_record;
+    tamper(record_file, "\"size_b\": ", "\"size\": ");
+    expect_refused(log, "files: expected an array of {file, size_b, fnv1a}");
     std::ofstream(record_file) << good_record;
     std::filesystem::remove(folder_ / "scene.toml");
     expect_refused(log, "scene.toml");

@@ -48,6 +48,12 @@ std::string progress_line(const std::string& what, const Step& step, double seco
     return line;
 }
 
+double ProgressPace::next_s(const Step& step) {
+    pause_s_ = step == last_ ? std::min(2 * pause_s_, kLongest_s) : kBetween_s;
+    last_ = step;
+    return pause_s_;
+}
+
 Progress::Progress(std::string what, std::function<Step()> poll)
     : what_(std::move(what)),
       poll_(std::move(poll)),
@@ -66,13 +72,14 @@ void Progress::show(Step step) {
 
 void Progress::print(const std::stop_token& stop) {
     const bool terminal = on_terminal();
-    const Seconds between(terminal ? 0.3 : 10);
+    constexpr double kRewritten_s = 0.3;
+    ProgressPace pace;
     const auto began = std::chrono::steady_clock::now();
     std::mutex m;
     std::unique_lock lock(m);
     std::condition_variable_any woken;
-    for (Seconds pause(terminal ? 0.3 : 2);
-         !woken.wait_for(lock, stop, pause, [&] { return stop.stop_requested(); }); pause = between) {
+    Seconds pause(terminal ? kRewritten_s : ProgressPace::kFirst_s);
+    while (!woken.wait_for(lock, stop, pause, [&] { return stop.stop_requested(); })) {
         Step step;
         if (poll_) {
             step = poll_();
@@ -84,6 +91,7 @@ void Progress::print(const std::stop_token& stop) {
             progress_line(what_, step, Seconds(std::chrono::steady_clock::now() - began).count());
         terminal ? print_error("\r\033[K{}", line.substr(0, columns())) : print_error("{}\n", line);
         std::fflush(stderr);
+        pause = Seconds(terminal ? kRewritten_s : pace.next_s(step));
     }
 }
 

@@ -1,14 +1,19 @@
 // narpa run - the emulator: poses in on CAN, frames and packets out, until the time is over or a signal comes.
 #include <fmt/format.h>
 
+#include <atomic>
+#include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <thread>
 
 #include "apps/cli.h"
 #include "apps/device_options.h"
 #include "apps/scene_options.h"
 #include "base/ready.h"
+#include "base/time.h"
 #include "drivers/lidar/packet_sink.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/emulator.h"
@@ -30,7 +35,7 @@ struct RunCommandOptions {
     std::string estimate_camera;  ///< empty: the first
     TrackerFlags estimator;
     RunOptions run;
-    std::optional<double> late_max_percent;
+    std::optional<double> late_max_percent, patience_s;
     int ready_fd = -1;
 };
 
@@ -66,6 +71,30 @@ Step step_of(const Emulator& emulator) {
             if (const std::string how = sensor->progress(); !how.empty()) text += "; " + how;
     return {o.duration_s > 0 ? t_s / o.duration_s : -1, text};
 }
+
+/// Asks the run to stop where its clock stands still for too long.
+class Patience {
+public:
+    Patience(const Emulator& emulator, const std::optional<double>& patience_s) {
+        if (!patience_s) return;
+        watch_ =
+            std::jthread([this, &emulator, most_ns = std::llround(*patience_s * 1e9)](const std::stop_token& stop) {
+                std::int64_t t_ns = emulator.t_ns(), moved_ns = monotonic_ns();
+                for (; !stop.stop_requested(); std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
+                    if (const std::int64_t t = emulator.t_ns(); t != t_ns) t_ns = t, moved_ns = monotonic_ns();
+                    if (monotonic_ns() - moved_ns < most_ns) continue;
+                    is_over_ = true;
+                    stop_flag() = true;
+                    return;
+                }
+            });
+    }
+    [[nodiscard]] bool is_over() const { return is_over_; }
+
+private:
+    std::atomic<bool> is_over_{false};
+    std::jthread watch_;
+};
 
 Outcome run(const RunCommandOptions& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
@@ -112,12 +141,20 @@ Outcome run(const RunCommandOptions& options) {
     for (const auto& feed : (*emulator)->observers()) say(feed->observer().description());
 
     notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
+    bool gave_up = false;
     const Status status = [&] {
+        const Patience patience(**emulator, options.patience_s);
         const Progress progress("running", [&] { return step_of(**emulator); });
-        return (*emulator)->run(stop_flag());
+        const Status ran = (*emulator)->run(stop_flag());
+        gave_up = patience.is_over();
+        return ran;
     }();
     say(to_text(**emulator));
     if (!status) return status.error();
+    if (gave_up)
+        return Error{fmt::format("no command advanced the clock for {:g} s, expected one within --patience",
+                                 *options.patience_s),
+                     "", 0, 0, ErrorKind::failed};
     nlohmann::json document = report(**emulator);
     if (!options.estimates) document["estimate"] = nullptr;
     return document;
@@ -133,6 +170,12 @@ Command add_run(Parser app) {
     o->devices.add_to(c);
     const Option lockstep = c.flag("--lockstep", o->run.lockstep,
                                    "The clock advances only with commands; no wall time enters any result");
+    c.option(
+         "--patience", o->patience_s,
+         "Wall seconds without progress after which a lockstep run ends with status 1 (default: waits for ever)")
+        .type_name("SECONDS")
+        .range(0.001, 1e6)
+        .needs(lockstep);
     c.option("--seed", o->seed, "Seed of the sensors' noise and of the renders, instead of the scene's");
     c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         .type_name("SECONDS")

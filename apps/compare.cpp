@@ -24,15 +24,16 @@ struct CompareOptions {
     std::string scene, frame, camera, target, out;
     PoseOptions pose;
     double time_s = 0;
-    int spp = 64, threads = 0;
+    int spp = 64, frame_spp = 0, threads = 0;
     std::optional<double> min_overlap, min_correlation, max_shift_px;
 };
 
 /// The limits that the comparison does not meet, a sentence each.
 std::vector<std::string> faults_of(const FrameComparison& c, const CompareOptions& o) {
     std::vector<std::string> faults;
-    if (o.min_overlap && c.overlap() < *o.min_overlap)
-        faults.push_back(fmt::format("overlap {:.4f}, expected at least {:g}", c.overlap(), *o.min_overlap));
+    if (o.min_overlap && c.overlap_beyond_noise() < *o.min_overlap)
+        faults.push_back(
+            fmt::format("overlap {:.4f}, expected at least {:g}", c.overlap_beyond_noise(), *o.min_overlap));
     if (o.min_correlation && c.correlation.value_or(-1) < *o.min_correlation)
         faults.push_back(fmt::format("correlation {}, expected at least {:g}",
                                      c.correlation ? fmt::format("{:.4f}", *c.correlation) : "not known",
@@ -54,6 +55,7 @@ nlohmann::json or_null(const std::optional<T>& value) {
 
 nlohmann::json numbers_of(const FrameComparison& c) {
     nlohmann::json document{{"overlap", c.overlap()},
+                            {"overlap_beyond_noise", c.overlap_beyond_noise()},
                             {"lit_frame_px", c.lit_frame},
                             {"lit_render_px", c.lit_render},
                             {"lit_both_px", c.lit_both},
@@ -74,13 +76,14 @@ nlohmann::json numbers_of(const FrameComparison& c) {
 
 std::string words_of(const FrameComparison& c) {
     std::string out = fmt::format(
-        "  lit in both: {:.1f} % of the pixels lit in either ({} in the frame, {} in the render)\n"
+        "  lit in both: {:.1f} % of the pixels lit in either ({} in the frame, {} in the render); {:.1f} % without "
+        "differences that noise explains\n"
         "  brightness: frame = {:.6g} DN + {:.4g} x render{}\n"
         "  residuals: {:.4g} DN RMS, {:.1f} % of the mean{}\n",
-        100 * c.overlap(), c.lit_frame, c.lit_render, c.black_dn, c.gain,
+        100 * c.overlap(), c.lit_frame, c.lit_render, 100 * c.overlap_beyond_noise(), c.black_dn, c.gain,
         c.correlation ? fmt::format(", correlation {:.4f}", *c.correlation) : ", uniform", c.residual_dn,
         100 * c.residual_dn / c.mean_dn,
-        c.residual_noise ? fmt::format(", {:.3g} times the noise of detector and render", *c.residual_noise) : "");
+        c.residual_noise ? fmt::format(", {:.3g} times the noise of detector and samples", *c.residual_noise) : "");
     if (!c.shift) return out + "  shift: not known, the render is uniform";
     return out + fmt::format(
                      "  shift: the frame shows it {:.2f} px further {} and {:.2f} px further {} than the render{}, "
@@ -138,7 +141,7 @@ ExpectedFrame expected_frame(const CompareOptions& o, const World& world, std::s
         threads.arena.execute([&] { unit.expose(0, t_ns, 0, &shown); });
     }
     ExpectedFrame out{expected_signal(unit.camera(), unit.radiance()), std::move(shown.variance),
-                      std::move(shown.body)};
+                      std::move(shown.body), o.frame_spp > 0 ? static_cast<double>(o.spp) / o.frame_spp : 0};
     const auto& [r, g, b] = sensor_model(unit.camera()).dn_per_radiance;
     for (float& v : out.variance) v *= static_cast<float>(std::pow(r + g + b, 2));
     return out;
@@ -204,20 +207,26 @@ Command add_compare(Parser app) {
         .range(-9e9, 9e9);
     o->pose.add_to(c);
     c.option("--spp", o->spp, "Samples per pixel of the render").range(1, 65535).shows_default();
+    c.option("--frame-spp", o->frame_spp,
+             "Samples per pixel of a frame that narpa rendered: their noise counts as noise (default: of a real "
+             "camera)")
+        .range(1, 65535);
     c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
     c.option("-o,--output", o->out,
              "Frame, render and residuals side by side; their numbers in FILE.json beside it")
         .type_name("FILE.png");
     c.group("Results");
     for (const Option& option :
-         {c.option("--min-overlap", o->min_overlap, "Least part of the pixels lit in either that is lit in both")
+         {c.option("--min-overlap", o->min_overlap,
+                   "Least part of the pixels lit in either that is lit in both, not counting differences that "
+                   "noise explains")
               .range(0.0, 1.0),
           c.option("--min-correlation", o->min_correlation, "Least correlation of their brightness")
               .range(-1.0, 1.0),
           c.option("--max-shift", o->max_shift_px, "Largest shift of the target").type_name("PX").range(0.0, 32.0)})
         (void)option.group("Limits: exit status 1 where one is missed");
     c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png",
-                "narpa compare docking --frame out/frame.png --min-overlap 0.95 --max-shift 0.5"});
+                "narpa compare docking --frame out/frame.png --frame-spp 1 --min-overlap 0.95 --max-shift 0.5"});
     return [o] { return compare(*o); };
 }
 

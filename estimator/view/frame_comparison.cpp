@@ -13,6 +13,7 @@ namespace {
 
 /// A pixel is lit if its signal is above 10 % of the 99th percentile and above five standard deviations of noise.
 constexpr double kLitPart = 0.1, kBrightPart = 0.01, kLitSigmas = 5;
+constexpr double kBeyondNoiseSigmas = 4;
 /// The black level is taken from the frame if the render is empty in at least this part of the pixels.
 constexpr double kEmptyPart = 0.01;
 /// Variances below this part of the squares are rounding.
@@ -120,9 +121,29 @@ std::optional<FrameComparison::Shift> find_shift(const Signals& s, double most, 
     return out;
 }
 
+/// Variance of frame - gain * render at pixel p: of the sensor, and of the samples of both.
+double difference_variance(const Signals& s, std::size_t p, const SensorModel& sensor, const ExpectedFrame& render,
+                           double gain) {
+    const double of_samples = render.variance.empty() ? 0 : gain * gain * static_cast<double>(render.variance[p]);
+    return sensor.variance_dn2(sensor.black_dn + gain * s.render[p]) +
+           of_samples * (1 + render.frame_variance_ratio);
+}
+
+std::size_t lit_one_beyond_noise(const Signals& s, const SensorModel& sensor, const ExpectedFrame& render,
+                                 double gain) {
+    std::size_t n = 0;
+    for (std::size_t p = 0; p < s.frame.size(); ++p) {
+        if (s.lit_frame[p] == s.lit_render[p]) continue;
+        const double difference = s.frame[p] - gain * s.render[p];
+        n += difference * difference >
+             kBeyondNoiseSigmas * kBeyondNoiseSigmas * difference_variance(s, p, sensor, render, gain);
+    }
+    return n;
+}
+
 /// Compares the brightness in these pixels.
 void compare_brightness(const Signals& s, const std::vector<std::size_t>& pixels, const SensorModel& sensor,
-                        const std::vector<float>& variance, FrameComparison& out) {
+                        const ExpectedFrame& render, FrameComparison& out) {
     double n = 0, f = 0, r = 0, ff = 0, fr = 0, rr = 0;
     for (const std::size_t p : pixels) {
         n += 1, f += s.frame[p], r += s.render[p];
@@ -135,10 +156,8 @@ void compare_brightness(const Signals& s, const std::vector<std::size_t>& pixels
     double squares = 0, over_noise = 0;
     for (const std::size_t p : pixels) {
         const double residual = s.frame[p] - out.gain * s.render[p];
-        const double of_render = variance.empty() ? 0 : out.gain * out.gain * static_cast<double>(variance[p]);
         squares += residual * residual;
-        over_noise +=
-            residual * residual / (sensor.variance_dn2(sensor.black_dn + out.gain * s.render[p]) + of_render);
+        over_noise += residual * residual / difference_variance(s, p, sensor, render, out.gain);
     }
     out.residual_dn = std::sqrt(squares / n);
     if (sensor.read_dn2 > 0 || sensor.shot_dn > 0) out.residual_noise = std::sqrt(over_noise / n);
@@ -183,7 +202,8 @@ Result<FrameComparison> compare_frame(const MeasuredImage& frame, const SensorMo
     if (counted.size() < kFewestLit)
         return Error{fmt::format("{} of its lit pixels are not clipped, expected at least {}: a shorter exposure",
                                  counted.size(), kFewestLit)};
-    compare_brightness(s, counted, sensor, render.variance, out);
+    out.lit_one_beyond_noise = lit_one_beyond_noise(s, sensor, render, gain);
+    compare_brightness(s, counted, sensor, render, out);
     if (out.lit_render == 0 || !(out.gain > 0) || !std::isfinite(out.gain))
         return Error{
             "it is dark where the render is lit, or lit where the render is dark: expected the target there"};

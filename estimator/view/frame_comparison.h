@@ -16,6 +16,8 @@ struct ExpectedFrame {
     std::vector<float> signal;       ///< expected_signal
     std::vector<float> variance;     ///< of `signal` by its samples, DN^2; empty: none
     std::vector<std::int32_t> body;  ///< index of the body at each pixel's centre, -1 none (Aovs::body)
+    /// Of a frame that was rendered as well: the variance by its samples over `variance`; 0: of a camera.
+    double frame_variance_ratio = 0;
 };
 
 inline constexpr int kMaxComparedShift_px = 32;
@@ -30,6 +32,9 @@ struct FrameComparison {
     /// sensor's if these are fewer than a hundredth.
     double black_dn = 0;
     std::size_t lit_frame = 0, lit_render = 0, lit_both = 0;
+    /// Pixels lit in only one of them, where both differ by more than four standard deviations of the noise of
+    /// sensor and samples.
+    std::size_t lit_one_beyond_noise = 0;
     /// Gain and the fields below are of the pixels lit in either image that are neither clipped in the frame nor
     /// beyond the frame's limit in the render. gain: light of the frame over that of the render: frame = black +
     /// gain * render.
@@ -53,6 +58,11 @@ struct FrameComparison {
     /// Pixels lit in both over pixels lit in either.
     [[nodiscard]] double overlap() const {
         const std::size_t either = lit_frame + lit_render - lit_both;
+        return either > 0 ? static_cast<double>(lit_both) / static_cast<double>(either) : 0;
+    }
+    /// The same, not counting differences that noise explains.
+    [[nodiscard]] double overlap_beyond_noise() const {
+        const std::size_t either = lit_both + lit_one_beyond_noise;
         return either > 0 ? static_cast<double>(lit_both) / static_cast<double>(either) : 0;
     }
 };

@@ -68,6 +68,29 @@ TEST_F(Comparison, TheSameFitsToItsNoise) {
     EXPECT_LT(std::hypot(c.shift->x_px, c.shift->y_px), 0.02);
 }
 
+/// A narpa frame of one sample per pixel: each either shows the surface or not.
+TEST_F(Comparison, NoiseOfTheFramesSamplesIsNoDifference) {
+    MeasuredImage frame = frame_of(0, 0, 1, 20);
+    std::mt19937_64 random(7);
+    constexpr double kCovered = 0.8;
+    std::bernoulli_distribution shows(kCovered);
+    render.variance.assign(render.signal.size(), 0);
+    for (std::size_t p = 0; p < frame.dn.size(); ++p) {
+        const float full = render.signal[p];
+        if (full <= 0) continue;
+        render.variance[p] = static_cast<float>(kCovered * (1 - kCovered)) * full * full / 64;
+        render.signal[p] = static_cast<float>(kCovered) * full;
+        if (!shows(random)) frame.dn[p] -= full;
+    }
+    EXPECT_LT(compared(frame).overlap_beyond_noise(), 0.85) << "of a camera, whose pixels are not sampled";
+    render.frame_variance_ratio = 64;
+    const FrameComparison c = compared(frame);
+    EXPECT_LT(c.overlap(), 0.85);
+    EXPECT_GT(c.overlap_beyond_noise(), 0.99);
+    ASSERT_TRUE(c.residual_noise);
+    EXPECT_NEAR(*c.residual_noise, 1, 0.1);
+}
+
 TEST_F(Comparison, FindsBrightnessBlackAndShift) {
     const FrameComparison c = compared(frame_of(5.3, -2.6, 1.7, 35));
     EXPECT_NEAR(c.black_dn, 35, 0.2);
@@ -78,6 +101,7 @@ TEST_F(Comparison, FindsBrightnessBlackAndShift) {
     EXPECT_GT(c.shift->correlation, 0.99) << "at the nearest whole pixel";
     EXPECT_NEAR(c.gain, 1.7, 0.02) << "of a frame that is displaced too";
     EXPECT_LT(c.overlap(), 0.8);
+    EXPECT_LT(c.overlap_beyond_noise(), 0.9) << "no noise explains a shift";
     EXPECT_NEAR(compared(frame_of(0, 0, 1.7, 35)).gain, 1.7, 2e-3);
 }
 

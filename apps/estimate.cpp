@@ -2,6 +2,7 @@
 // with covariance, bound and truth.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -12,12 +13,14 @@
 #include "apps/shipped.h"
 #include "apps/sweep_file.h"
 #include "base/write_file.h"
+#include "emulator/log/run_record.h"
 #include "emulator/replay/replay.h"
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"
 #include "estimator/search/cloud_search.h"
 #include "estimator/view/measured_image.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tracking/estimate_report.h"
 
 namespace narpa::cli {
@@ -75,7 +78,23 @@ Status write_rows(const std::string& path, const std::vector<TrackedFrame>& trac
     return write_file(path, rows);
 }
 
+/// A log has a row of each sweep, not its packets; a run in lockstep makes them again.
+Status check_no_lidar(const EstimateOptions& o) {
+    const auto record = read_run_record(o.input);
+    if (!record) return Ok{};  // Replay::open reports it
+    const auto scene = read_scene(o.scene.empty() ? record->scene_file : o.scene);
+    if (!scene || std::ranges::find(scene->lidars, o.sensor, &Lidar::name) == scene->lidars.end()) return Ok{};
+    return Error{
+        fmt::format("holds no packets of LiDAR \"{0}\": make them again by `narpa run {1} --can "
+                    "log:{2}/can.log --lockstep --lidar {0}={0}.pcap`, then `narpa estimate {1} --lidar {0} "
+                    "--sweep {0}.pcap --time SECONDS`",
+                    o.sensor, scene->file, o.input),
+        o.input};
+}
+
 Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_options) {
+    if (!o.sensor.empty())
+        if (Status good = check_no_lidar(o); !good) return good.error();
     auto run = Replay::open(o.input, o.sensor, o.scene);
     if (!run) return run.error();
     auto tracker = FrameTracker::create((*run)->world(), (*run)->camera_index(), tracker_options);

@@ -25,6 +25,10 @@ Outcome judge(const JudgeOptions& o) {
         if (!file) return file.error();
         gates = *file;
     }
+    if (*kind == rehearsal::FolderKind::summary)
+        return Error{
+            "holds the summary of campaigns elsewhere: judge those, then `narpa rehearse --merge` them again",
+            o.folder};
     if (*kind == rehearsal::FolderKind::run) return print_run(rehearsal::judge_run(o.folder, gates));
     auto summary = [&] {
         Progress progress("judging");

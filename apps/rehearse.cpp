@@ -7,6 +7,7 @@
 #include "apps/rehearsal_text.h"
 #include "apps/shipped.h"
 #include "rehearsal/runner/campaign.h"
+#include "rehearsal/runner/merge.h"
 #include "rehearsal/runner/rehearsal.h"
 
 namespace narpa::cli {
@@ -18,6 +19,7 @@ struct RehearseOptions {
     std::size_t runs = 0;  ///< 0: one, without a summary
     int jobs = 1;
     bool replace = false;
+    std::vector<std::string> merge;  ///< campaigns to summarise together; nothing is flown
 };
 
 /// True if a line has arrived on standard input.
@@ -59,6 +61,12 @@ Outcome many(const rehearsal::CampaignOptions& options) {
 
 Outcome rehearse(const RehearseOptions& given) {
     rehearsal::RehearsalOptions o = given.run;
+    if (!given.merge.empty()) {
+        if (!o.scenario.empty())
+            return Error{fmt::format("--merge flies nothing, expected no scenario beside it, got {}", o.scenario)};
+        if (o.folder.empty()) return Error{"--merge: expected a folder for the summary, -o DIR"};
+        return print_campaign(rehearsal::merge_campaigns(given.merge, o.folder), o.folder);
+    }
     for (const std::string& text : given.video) {
         auto pair = split_pair(text, "CAMERA=DEVICE, like nav=/dev/video10");
         if (!pair) return pair.error();
@@ -100,6 +108,16 @@ Command add_rehearse(Parser app) {
     c.flag("--replace", o->replace,
            "Fly runs of a campaign again that were flown with another scenario or seed (default: refuse)")
         .needs(runs);
+    c.option("--merge", o->merge,
+             "Fly nothing: summarise the runs of these campaigns of one scenario, of different seeds, together")
+        .type_name("DIR")
+        .values(1, 10000)
+        .excludes(runs);
+    c.flag(
+        "--lean", r.lean,
+        "Of runs that pass keep only records, result and scenario (20 KB in place of 8 MB): in lockstep the seed "
+        "repeats the rest");
+    c.flag("--keep-frames", r.keep_frames, "Keep the frames that the navigation gets, as emulator/CAMERA.y4m");
     c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
     c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2 | usb:[ADAPTER]")
         .type_name("BUS")

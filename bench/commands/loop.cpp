@@ -98,8 +98,9 @@ Outcome bench_loop(LoopBenchOptions o) {
 
     std::vector<std::string> faults = loop_faults(*runs, o.late_max_percent / 100);
     if (stop_flag()) faults.emplace_back("interrupted before the end");
-    const std::string title =
-        fmt::format("{}, {:g} s; load on processors {}", scene->name, o.run.duration_s, fmt::join(o.load, ", "));
+    const std::string load =
+        o.load.empty() ? "without load" : fmt::format("load on processors {}", fmt::join(o.load, ", "));
+    const std::string title = fmt::format("{}, {:g} s; {}", scene->name, o.run.duration_s, load);
     say(title);
     say(to_text(*runs));
     for (const std::string& fault : faults) say("failed: " + fault);

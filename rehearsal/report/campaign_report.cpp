@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <map>
 
 #include "rehearsal/judge/verdict.h"
@@ -71,6 +72,10 @@ json summarise(const Scenario& scenario, const std::vector<RunResult>& runs) {
         ++known;
         good += passed(run);
         each.push_back({{"run", run.run}, {"seed", run.seed}, {"folder", run.folder}, {"passed", passed(run)}});
+        if (run.draws.is_object()) each.back()["draws"] = run.draws;
+        if (run.result.contains("contact") && run.result["contact"].is_object())
+            for (const json& c : run.result["contact"]["conditions"])
+                each.back()["contact"][c["name"].get<std::string>()] = c["value"];
         if (!passed(run)) {
             const auto [gate, reason] = cause(run);
             each.back()["gate"] = gate;
@@ -136,6 +141,42 @@ std::string campaign_headline(const json& s) {
     return fmt::format("{} of {} runs succeeded: {:.1f} %", good, runs, s["success_rate"].get<double>() * 100);
 }
 
+namespace {
+
+/// What the dynamics draw for the start of a run.
+constexpr std::array<const char*, 4> kStartDraws{"start_position", "start_velocity", "start_attitude",
+                                                 "start_rate"};
+
+/// A row for each run: the draws of its start, its contact, its outcome.
+json draws_table(const json& summary) {
+    json rows = json::array();
+    for (const json& run : summary["each"]) {
+        json row{{"run", run["run"]},
+                 {"folder", run["folder"]},
+                 {"seed", run["seed"]},
+                 {"page", run.value("page", true)}};
+        for (const char* draw : kStartDraws) {
+            const json three = run.contains("draws") ? run["draws"].value(draw, json()) : json();
+            row["cells"].push_back(three.is_array() && three.size() == 3
+                                       ? fmt::format("{:.2f}, {:.2f}, {:.2f}", three[0].get<double>(),
+                                                     three[1].get<double>(), three[2].get<double>())
+                                       : "");
+        }
+        for (const json& condition : summary["contact"]) {
+            const auto name = condition["name"].get<std::string>();
+            const bool made = run.contains("contact") && run["contact"].contains(name);
+            row["cells"].push_back(made ? fmt::format("{:.4f}", run["contact"][name].get<double>()) : "");
+        }
+        const bool passed = run["passed"];
+        row["outcome"] = passed ? "passed" : "failed";
+        row["reason"] = passed ? "" : fmt::format("{}: {}", run.value("gate", ""), run.value("reason", ""));
+        rows.push_back(row);
+    }
+    return rows;
+}
+
+}  // namespace
+
 std::string campaign_page(const Scenario& scenario, const json& summary, const std::string& folder) {
     const bool complete = summary["judged"] == summary["runs"], passed = summary["passed"];
     json page = summary, failed = json::array();
@@ -151,6 +192,7 @@ std::string campaign_page(const Scenario& scenario, const json& summary, const s
                  {"made_contact", !summary["contact"].empty()},
                  {"where", scenario.gear ? "Where they touched down" : "Where the ports met"},
                  {"charts", drawn_charts(folder)},
+                 {"table", draws_table(summary)},
                  {"failed", failed}});
     return filled(template_text("campaign.html"), page);
 }

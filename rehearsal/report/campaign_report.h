@@ -15,8 +15,9 @@ namespace narpa::rehearsal {
 struct RunResult {
     std::size_t run = 0;
     std::uint64_t seed = 0;
-    std::string folder;     ///< within the campaign's
-    nlohmann::json result;  ///< the content of its result.json; null: none
+    std::string folder;      ///< within the campaign's
+    nlohmann::json result;   ///< the content of its result.json; null: none
+    nlohmann::json draws{};  ///< "draws" of its dynamics.json, in standard deviations; null: none
 };
 
 /// The "contact" objects of the runs that made contact.

@@ -58,6 +58,8 @@ ChildProcess::Command command_for(const CampaignOptions& o, const std::string& f
     c.line.insert(c.line.end(), {"--can", r.bus});
     for (const auto& [camera, device] : r.video) c.line.insert(c.line.end(), {"--video", camera + "=" + device});
     if (r.real_time) c.line.emplace_back("--real-time");
+    if (r.keep_frames) c.line.emplace_back("--keep-frames");
+    if (r.lean) c.line.emplace_back("--lean");
     if (!r.dynamics.empty()) c.line.insert(c.line.end(), {"--dynamics", r.dynamics});
     if (!r.navigation.empty()) c.line.insert(c.line.end(), {"--navigation", r.navigation});
     c.out = c.err = folder + ".log";
@@ -133,7 +135,8 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     if (!texts) return texts.error();
     const auto lock = claim_folder(o.run.folder, FolderKind::campaign);
     if (!lock) return lock.error();
-    std::vector<RunResult> runs = campaign_runs(o.run.folder, o.runs, o.run.seed.value_or(scenario->seed));
+    const std::uint64_t first_seed = o.run.seed.value_or(scenario->seed);
+    std::vector<RunResult> runs = campaign_runs(o.run.folder, o.runs, first_seed);
     if (!o.replace)
         if (Status good = check_flown(o, *scenario, texts->hash, runs); !good) return good.error();
     std::error_code failed;
@@ -185,17 +188,27 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
 
+    runs = campaign_runs(o.run.folder, o.runs, first_seed);
     for (RunResult& r : runs)
-        r.result = is_done(folder_of(r), texts->hash, r.seed) ? read_json(folder_of(r) + "/result.json") : nullptr;
+        if (!is_done(folder_of(r), texts->hash, r.seed)) r.result = nullptr;
     return write_summary(o.run.folder, *scenario, runs,
                          {{"scenario_hash", texts->hash}, {"version", o.run.version}});
 }
 
+RunResult run_in(const std::string& folder) {
+    const json dynamics = read_json(folder + "/dynamics/dynamics.json");
+    return {0, 0, folder, read_json(folder + "/result.json"),
+            dynamics.is_object() ? dynamics.value("draws", json()) : json()};
+}
+
 std::vector<RunResult> campaign_runs(const std::string& folder, std::size_t runs, std::uint64_t first_seed) {
     std::vector<RunResult> all;
-    for (std::size_t k = 1; k <= runs; ++k)
-        all.push_back(
-            {k, first_seed + k - 1, run_folder(k), read_json(folder + "/" + run_folder(k) + "/result.json")});
+    for (std::size_t k = 1; k <= runs; ++k) {
+        all.push_back(run_in(folder + "/" + run_folder(k)));
+        all.back().run = k;
+        all.back().seed = first_seed + k - 1;
+        all.back().folder = run_folder(k);
+    }
     return all;
 }
 
@@ -203,6 +216,9 @@ Result<json> write_summary(const std::string& folder, const Scenario& scenario, 
                            const json& facts) {
     json summary = summarise(scenario, runs);
     summary.update(facts);
+    std::error_code none;
+    for (json& run : summary["each"])  // --lean keeps none of those that pass
+        run["page"] = fs::exists(fs::path(folder) / run["folder"].get<std::string>() / "index.html", none);
     if (Status good = write_file(folder + "/junit.xml", campaign_junit(scenario.name, runs)); !good)
         return good.error();
     if (Status good = write_file(folder + "/summary.json", summary.dump(2) + "\n"); !good) return good.error();

@@ -26,6 +26,8 @@ struct CampaignOptions {
 /// written, if a run was flown with another scenario or seed and is not to be replaced.
 Result<nlohmann::json> run_campaign(const CampaignOptions& options, const Console& console, const StopFlag& stop);
 
+/// The result and the draws in a run's folder; number and seed are left at 0.
+[[nodiscard]] RunResult run_in(const std::string& folder);
 /// The runs 1 to `runs` of a campaign, with the results that there are.
 [[nodiscard]] std::vector<RunResult> campaign_runs(const std::string& folder, std::size_t runs,
                                                    std::uint64_t first_seed);

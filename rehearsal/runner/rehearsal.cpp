@@ -191,6 +191,9 @@ private:
         line = {program("narpa"),      "run",    scenario_.scene,       "--can", options_.bus, "--log",
                 in_folder("emulator"), "--seed", std::to_string(seed())};
         append(line, "--video", video_);
+        if (options_.keep_frames)
+            for (const std::string& camera : scenario_.navigation.cameras)
+                append(line, "--video", {camera + "=" + in_folder("emulator/" + camera + ".y4m")});
         append(line, "--lidar", lidar_sinks_);
         if (!options_.real_time) line.emplace_back("--lockstep");
         if (options_.threads > 0) append(line, "--threads", {std::to_string(options_.threads)});
@@ -406,10 +409,23 @@ private:
     Result<RehearsalResult> write_results() {
         record_["wall_s"] = seconds_since(began_);
         record_["trouble"] = trouble_;
-        RehearsalResult done =
-            narpa::rehearsal::write_results(scenario_, judge_, record_, options_.folder, options_.page);
+        const Pages pages = !options_.page ? Pages::none : options_.lean ? Pages::of_failed : Pages::all;
+        RehearsalResult done = narpa::rehearsal::write_results(scenario_, judge_, record_, options_.folder, pages);
         keep_first(done.written, write_whole(in_folder("rehearsal.json"), record_.dump(2) + "\n"));
+        if (options_.lean && done.verdict.passed && done.written) keep_lean_files();
         return done;
+    }
+
+    void keep_lean_files() const {
+        std::error_code failed;
+        std::vector<fs::path> files;
+        for (const auto& entry : fs::recursive_directory_iterator(options_.folder, failed))
+            if (!entry.is_directory(failed)) files.push_back(entry.path());
+        for (const fs::path& file : files)
+            if (std::ranges::find(kLeanFiles, fs::relative(file, options_.folder, failed).string()) ==
+                kLeanFiles.end())
+                fs::remove(file, failed);
+        for (const char* folder : {"emulator", "navigation", "charts"}) fs::remove(in_folder(folder), failed);
     }
 
     const RehearsalOptions& options_;

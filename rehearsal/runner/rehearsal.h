@@ -2,6 +2,7 @@
 /// bus, stops them and writes the report.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -27,9 +28,15 @@ struct RehearsalOptions {
     int threads = 0;                           ///< of emulator and navigation; 0: all cores
     double patience_s = 120;                   ///< wall time without progress
     bool page = true;                          ///< writes index.html
-    std::string programs;                      ///< folder of narpa, narpa-dynamics, narpa-navigation; empty: ours
+    bool keep_frames = false;  ///< writes the frames that the navigation gets as emulator/CAMERA.y4m
+    bool lean = false;         ///< of a run that passes keeps only kLeanFiles
+    std::string programs;      ///< folder of narpa, narpa-dynamics, narpa-navigation; empty: ours
     std::string version;
 };
+
+/// A run in lockstep can be flown again with the seed in them.
+inline constexpr std::array<std::string_view, 6> kLeanFiles{
+    "rehearsal.json", "result.json", "dynamics/dynamics.json", "scenario.toml", "scene.toml", "map.toml"};
 
 struct RehearsalResult {
     Verdict verdict;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -20,18 +21,6 @@ using nlohmann::json;
 json document(const std::string& file) {
     json read = json::parse(read_text(file), nullptr, false);
     return read.is_discarded() ? json(nullptr) : read;
-}
-
-/// The scenario that was flown, from the copy in the folder.
-Result<Scenario> flown_scenario(const std::string& folder, const json& record) {
-    auto scenario = read_scenario(folder + "/scenario.toml", {record.value("scene", ""), record.value("map", "")});
-    if (!scenario) return scenario;
-    const auto scene = TomlFile::read(scenario->scene, "scene");
-    if (!scene) return scene.error();
-    if (scene->text() + '\n' != read_text(folder + "/scene.toml"))
-        return Error{fmt::format("has changed since it was flown, expected what stands in {}/scene.toml", folder),
-                     scenario->scene};
-    return scenario;
 }
 
 /// Replaces the gates by those of another file of the same scenario.
@@ -53,6 +42,17 @@ Status take_gates(const std::string& folder, const std::string& file, Scenario& 
 
 }  // namespace
 
+Result<Scenario> flown_scenario(const std::string& folder, const json& record) {
+    auto scenario = read_scenario(folder + "/scenario.toml", {record.value("scene", ""), record.value("map", "")});
+    if (!scenario) return scenario;
+    const auto scene = TomlFile::read(scenario->scene, "scene");
+    if (!scene) return scene.error();
+    if (scene->text() + '\n' != read_text(folder + "/scene.toml"))
+        return Error{fmt::format("has changed since it was flown, expected what stands in {}/scene.toml", folder),
+                     scenario->scene};
+    return scenario;
+}
+
 Result<RehearsalResult> judge_run(const std::string& folder, const std::string& gates) {
     const auto lock = lock_folder(folder);
     if (!lock) return lock.error();
@@ -62,6 +62,9 @@ Result<RehearsalResult> judge_run(const std::string& folder, const std::string& 
     if (!scenario) return scenario.error();
     if (!gates.empty())
         if (Status taken = take_gates(folder, gates, *scenario); !taken) return taken.error();
+    if (std::error_code none; !std::filesystem::exists(folder + "/emulator/can.log", none))
+        return Error{"no such file, expected the log of the run: --lean keeps none of runs that pass",
+                     folder + "/emulator/can.log"};
     Judge judge(*scenario);
     if (Status read = accept_log(judge, folder + "/emulator/can.log"); !read) return read.error();
     const json before = document(folder + "/result.json");
@@ -69,7 +72,7 @@ Result<RehearsalResult> judge_run(const std::string& folder, const std::string& 
     if (!record->contains("trouble")) (*record)["trouble"] = before.is_object() ? before.value("trouble", "") : "";
     if (!record->contains("version")) (*record)["version"] = "";
     if (!gates.empty()) (*record)["judged_by"] = gates;
-    return write_results(*scenario, judge, *record, folder, true);
+    return write_results(*scenario, judge, *record, folder, Pages::all);
 }
 
 Result<json> judge_campaign(const std::string& folder, const std::string& gates, const Console& console) {

@@ -9,6 +9,10 @@
 
 namespace narpa::rehearsal {
 
+/// The scenario that was flown into a run's folder, from the copy in it. `record`: read_record. An Error if the
+/// scene has changed since.
+Result<Scenario> flown_scenario(const std::string& folder, const nlohmann::json& record);
+
 /// Judges a recorded run by its own gates or, if `gates` is not empty, by `[gates]` and `duration_s` of that
 /// scenario file, which must otherwise be the scenario that was flown. Writes result.json, junit.xml, charts and
 /// index.html anew; nothing that was flown changes.

@@ -13,6 +13,7 @@
 
 #include "base/fnv1a.h"
 #include "base/write_file.h"
+#include "rehearsal/runner/child_process.h"
 #include "renderer/keys/toml_file.h"
 
 namespace narpa::rehearsal {
@@ -20,8 +21,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What only the folder of a run and that of a campaign have, in the order of FolderKind.
-constexpr std::array<const char*, 2> kMarks{"rehearsal.json", "runs"};
+/// What a folder of each kind has, and those before it in FolderKind have not.
+constexpr std::array<const char*, 3> kMarks{"rehearsal.json", "runs", "summary.json"};
+constexpr std::array<const char*, 3> kKindNames{"a single run", "a campaign", "a summary of campaigns"};
 
 }  // namespace
 
@@ -74,9 +76,9 @@ Result<FolderKind> kind_of_folder(const std::string& folder) {
     std::error_code failed;
     for (std::size_t k = 0; k < kMarks.size(); ++k)
         if (fs::exists(folder + "/" + kMarks[k], failed)) return static_cast<FolderKind>(k);
-    return Error{fmt::format("holds neither {} nor {}, expected the folder of a rehearsal or of a campaign",
-                             kMarks[0], kMarks[1]),
-                 folder};
+    return Error{
+        fmt::format("holds no {}, expected the folder of a rehearsal or of a campaign", fmt::join(kMarks, ", no ")),
+        folder};
 }
 
 Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind) {
@@ -87,11 +89,9 @@ Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind) {
     if (failed) return Error{"cannot be read: " + failed.message(), folder};
     const auto held = kind_of_folder(folder);
     if (empty || (held && *held == kind)) return lock;
-    const char* const is = !held                           ? "holds other files"
-                           : *held == FolderKind::campaign ? "holds a campaign"
-                                                           : "holds a single run";
-    return Error{fmt::format("{}, expected a new or empty folder, or that of {}", is,
-                             kind == FolderKind::campaign ? "a campaign" : "a single run"),
+    return Error{fmt::format("holds {}, expected a new or empty folder, or that of {}",
+                             held ? kKindNames[static_cast<std::size_t>(*held)] : "other files",
+                             kKindNames[static_cast<std::size_t>(kind)]),
                  folder};
 }
 

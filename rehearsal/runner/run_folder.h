@@ -12,12 +12,12 @@ namespace narpa::rehearsal {
 
 /// Creates the folder and locks it until the descriptor closes; an Error if another program has locked it.
 Result<Descriptor> lock_folder(const std::string& folder);
-/// What a folder of results holds.
-enum class FolderKind : std::uint8_t { run, campaign };
+/// What a folder of results holds; the last: only the summary of campaigns elsewhere.
+enum class FolderKind : std::uint8_t { run, campaign, summary };
 
 /// The same for a folder that is empty or of this kind; an Error if it holds other files.
 Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind);
-/// Whether a folder holds a campaign; an Error if it holds no results.
+/// An Error if it holds no results.
 Result<FolderKind> kind_of_folder(const std::string& folder);
 
 /// Scenario, scene and the navigation's map, each with everything it is based on, as one TOML text, and a hash of

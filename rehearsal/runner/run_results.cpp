@@ -23,7 +23,7 @@ void keep_first(Status& first, const Status& next) {
 }
 
 RehearsalResult write_results(const Scenario& scenario, const Judge& judge, const nlohmann::json& record,
-                              const std::string& folder, bool page) {
+                              const std::string& folder, Pages pages) {
     const auto in_folder = [&](const char* name) { return folder + "/" + name; };
     RehearsalResult done;
     const auto trouble = record["trouble"].get<std::string>();
@@ -40,7 +40,7 @@ RehearsalResult write_results(const Scenario& scenario, const Judge& judge, cons
     // The verdict is written first: on a full disk the rest may have no room.
     keep_first(done.written, write_whole(in_folder("result.json"), done.result.dump(2) + "\n"));
     keep_first(done.written, write_whole(in_folder("junit.xml"), junit(v, scenario.name, done.wall_s)));
-    if (!page) return done;
+    if (pages == Pages::none || (pages == Pages::of_failed && v.passed)) return done;
     keep_first(done.written, draw_charts(folder, rehearsal_plot(scenario, judge.bus(), v)));
     const Status paged =
         write_whole(in_folder("index.html"), rehearsal_page(scenario, judge.bus(), v, record, folder));

@@ -59,6 +59,7 @@ Result<toml::table> parse(const std::string& path, const std::string& head, int 
     if (depth == kDeepest) return wrong(based_on->source(), "more than eight files one on another");
     auto base = parse(beside(path, based_on->as_string()->get()), head, depth + 1);
     if (!base) return base.error();
+    table.at(head).as_table()->erase("based_on");
     merge(table, *std::move(base));
     return table;
 }

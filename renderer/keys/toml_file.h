@@ -28,7 +28,7 @@ public:
     [[nodiscard]] TableReader root(std::string name, Problems& problems, const TableKeys* keys = nullptr) const {
         return TableReader(*table_, std::move(name), problems, keys);
     }
-    /// What the files say together.
+    /// What the files say together, as one file without `based_on`.
     [[nodiscard]] std::string text() const;
     /// The same for each table and array of tables at the top, by its name.
     [[nodiscard]] std::map<std::string, std::string> tables() const;

@@ -44,7 +44,7 @@ protected:
 TEST_F(LogFolder, ARunThatCannotStartLeavesTheLogOfAnEarlierOne) {
     ran(scene(small_scene()), of_both_sensors());
     const Files before = files();
-    EXPECT_EQ(before.size(), 7U);
+    EXPECT_EQ(before.size(), 8U);
     RunOptions video = of_both_sensors(), lidar = of_both_sensors(), estimate = of_both_sensors();
     video.video[0].second = "/nowhere/at/all.y4m";
     lidar.lidar[0].second = "/nowhere/at/all.pcap";

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
+#include "protocols/video/embedded_line.h"
 #include "rehearsal/navigation/estimation/measurements.h"
 #include "rehearsal/navigation/sensor_inputs.h"
 #include "tests/rehearsal/simulated_sensors.h"
@@ -65,6 +66,46 @@ TEST_P(CameraMethods, MeasureTheTruePose) {
         EXPECT_LT(normalised_error_squared(error, s.pose->covariance), 27.9) << x_m;
         EXPECT_LT(error.tail<3>().norm(), 2e-3 * x_m);
     }
+}
+
+TEST_P(CameraMethods, RefuseAFrameThatTheCameraRepeats) {
+    CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], *GetParam(), 1);
+    const Plant plant = plant_at({20, 0, 0}, {});
+    const Prediction prediction = predicted(plant, chaser_target(plant));
+    const auto first = frame(*stage().model, plant, 3), second = frame(*stage().model, plant, 4);
+    EXPECT_TRUE(estimator.measure(first, 0, prediction).pose);
+    EXPECT_TRUE(estimator.measure(second, 1'000'000'000, prediction).pose) << "at rest, but with other noise";
+    const MeasurementResult again = estimator.measure(first, 2'000'000'000, prediction);
+    EXPECT_FALSE(again.pose);
+    EXPECT_EQ(again.answer, AnswerKind::refused);
+    EXPECT_EQ(again.why, "its image is the same, byte for byte, as 2 frames before: the camera repeats it");
+}
+
+TEST(FrameHistory, WithoutNoiseOnlyWhatHasMovedMustLookDifferent) {
+    Camera camera = stage().model->scene().cameras[stage().model->cameras()[0]];
+    camera.detector.reset();
+    FrameHistory history(camera);
+    const std::vector<std::uint8_t> bytes(100, 7);
+    Rigid3 T{{}, {0, 0, 20}};
+    EXPECT_EQ(history.staleness(bytes, 0, T), "");
+    EXPECT_EQ(history.staleness(bytes, 1, T), "");
+    T.t.z += 1;
+    EXPECT_NE(history.staleness(bytes, 2, T), "");
+}
+
+TEST(FrameHistory, AnEmbeddedLineStatesTheTime) {
+    Camera camera = stage().model->scene().cameras[stage().model->cameras()[0]];
+    camera.embedded_line = true;
+    camera.width = 200, camera.height = 2;
+    FrameHistory history(camera);
+    std::vector<std::uint8_t> bytes(400);
+    FrameLedger ledger;
+    ledger.t_exposure_mid_ns = 5'000'000'000;
+    ASSERT_TRUE(encode_embedded_line(ledger, std::span(bytes).last(200)));
+    EXPECT_EQ(history.staleness(bytes, 5'000'000'000, {}), "");
+    bytes[0] = 1;
+    EXPECT_EQ(history.staleness(bytes, 7'500'000'000, {}),
+              "it is a frame of another time: its embedded line says -2.500 s");
 }
 
 TEST_P(CameraMethods, GiveAReasonWithoutAPose) {

@@ -148,12 +148,14 @@ TEST(Campaign, PageAndTestReportAreWellFormed) {
     const Scenario s = full_scenario();
     std::vector<RunResult> runs = four_runs(s);
     runs.push_back({5, 15, "runs/0005", nullptr});
+    runs[0].draws = {{"start_position", {0.5, -1.25, 2.0}}};
     const nlohmann::json summary = summarise(s, runs);
     EXPECT_EQ(summary["judged"], 4);
     EXPECT_EQ(campaign_headline(summary),
               "Incomplete: 4 of 5 runs were flown, 2 of them succeeded. The same command goes on with the rest");
     const std::string page = campaign_page(s, summary, "/nowhere");
     EXPECT_EQ(markup_error(page), "");
+    EXPECT_NE(page.find("<td class=\"n\">0.50, -1.25, 2.00</td>"), std::string::npos) << "the draws of run 1";
     EXPECT_NE(page.find(">incomplete<"), std::string::npos);
     EXPECT_EQ(campaign_plot(s, contacts_of(runs))["runs"].size(), 4u) << "the run without a result has no contact";
     const std::string xml = campaign_junit("a&b", runs);

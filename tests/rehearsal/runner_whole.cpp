@@ -6,10 +6,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "base/write_file.h"
 #include "rehearsal/runner/campaign.h"
 #include "rehearsal/runner/child_process.h"
+#include "rehearsal/runner/merge.h"
 #include "rehearsal/runner/rehearsal.h"
 #include "rehearsal/runner/rejudge.h"
 #include "rehearsal/runner/rerun.h"
@@ -293,6 +295,7 @@ TEST_F(Whole, IsJudgedAnewByOtherGates) {
     ASSERT_EQ(gate(flown->verdict, "navigation").state, GateState::passed);
     const std::string log = read_text(o.folder + "/emulator/can.log");
     const nlohmann::json result = result_in(o.folder);
+    EXPECT_EQ(read_text(o.folder + "/scenario.toml").find("based_on"), std::string::npos) << "it stands alone";
 
     const std::string strict = scenario_with(folder, "strict.toml", "[gates.navigation]\nposition_m = 1e-6\n");
     const auto judged = judge_run(o.folder, strict);
@@ -329,6 +332,58 @@ TEST_F(Whole, IsJudgedAnewByOtherGates) {
     ASSERT_TRUE(summary) << summary.error().text();
     EXPECT_EQ((*summary)["failures"]["navigation"].size(), 1u) << summary->dump(1);
     EXPECT_EQ((*summary)["judged_by"], strict);
+}
+
+/// Passes after a second: no leg has to be flown to its end.
+std::string passing_scenario(const test::TemporaryFolder& folder) {
+    std::ofstream(folder / "passing.toml")
+        << "[scenario]\nbased_on = \"" << test::build_path("scenes/rehearsal/flyaround.toml")
+        << "\"\nname = \"passing\"\nduration_s = 1.0\n[gates]\ncomplete = false\n";
+    return folder / "passing.toml";
+}
+
+TEST_F(Whole, LeanCampaignsAreMerged) {
+    o.scenario = passing_scenario(folder);
+    o.lean = o.keep_frames = true;
+    const auto flown = [&](const std::string& name, std::uint64_t seed) {
+        o.folder = folder / name;
+        o.seed = seed;
+        const auto summary = run_campaign({o, 1, 1}, kSilent, stop);
+        ASSERT_TRUE(summary) << summary.error().text();
+        EXPECT_TRUE((*summary)["passed"]) << summary->dump(1);
+    };
+    flown("a", 5);
+    flown("b", 2);
+    const std::string run = folder / "a/runs/0001";
+    std::set<std::string> kept;
+    for (const auto& entry : fs::recursive_directory_iterator(run))
+        if (!entry.is_directory()) kept.insert(fs::relative(entry.path(), run));
+    std::set<std::string> lean(kLeanFiles.begin(), kLeanFiles.end());
+    lean.erase("map.toml");  // the navigation of a landing has one
+    EXPECT_EQ(kept, lean);
+    const auto judged = judge_run(run, "");
+    ASSERT_FALSE(judged);
+
+    const auto merged = merge_campaigns({folder / "a", folder / "b"}, folder / "all");
+    ASSERT_TRUE(merged) << merged.error().text();
+    EXPECT_EQ((*merged)["runs"], 2);
+    EXPECT_EQ((*merged)["each"][0]["seed"], 2) << "in the order of the seeds";
+    EXPECT_EQ((*merged)["each"][1]["folder"], "../a/runs/0001");
+    EXPECT_EQ((*merged)["each"][1]["draws"]["start_position"].size(), 3u);
+    EXPECT_EQ(markup_error(read_text(folder / "all/index.html")), "");
+    const auto twice = merge_campaigns({folder / "a", folder / "a"}, folder / "all");
+    ASSERT_FALSE(twice);
+    EXPECT_NE(twice.error().what.find("was flown with seed 5"), std::string::npos) << twice.error().text();
+    EXPECT_FALSE(merge_campaigns({folder / "none"}, folder / "all"));
+}
+
+TEST_F(Whole, KeepsTheFramesThatTheNavigationGets) {
+    o.keep_frames = true;
+    ASSERT_TRUE(run_rehearsal(o, kSilent, stop));
+    std::ifstream video(o.folder + "/emulator/nav.y4m", std::ios::binary);
+    std::string head;
+    ASSERT_TRUE(std::getline(video, head));
+    EXPECT_TRUE(head.starts_with("YUV4MPEG2 W")) << head;
 }
 
 TEST_F(Whole, ACampaignShowsHowFarARunIs) {

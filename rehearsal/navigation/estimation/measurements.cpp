@@ -53,6 +53,8 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
     const BodyPoses& at = model_.place(predicted.t_s, normalized(predicted.q_world_chaser * T.q), inverse(T));
     FrameInput frame{.image = *image, .at = at};
     frame.guess = inverse(camera_.T_mount_camera) * T;
+    out.why = history_.staleness(bytes, t_ns, frame.guess);
+    if (!out.why.empty()) return out;
     frame.motion = rotated(conjugate(camera_.T_mount_camera.q), predicted.motion);
     // The light is known in camera axes, from the chaser's attitude.
     frame.T_world_camera = at.T_world_body[model_.chaser()] * camera_.T_mount_camera;

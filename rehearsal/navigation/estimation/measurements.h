@@ -9,6 +9,7 @@
 
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/method/camera_method.h"
+#include "rehearsal/navigation/estimation/frame_history.h"
 #include "rehearsal/navigation/estimation/scene_model.h"
 #include "rehearsal/navigation/estimation/state_estimator.h"
 
@@ -32,11 +33,15 @@ struct MeasurementResult {
     double ms = 0;   ///< wall time
 };
 
-/// Frames of one camera: renders the model at the predicted pose and compares.
+/// Frames of one camera: renders the model at the predicted pose and compares. Refuses frames that it has had
+/// before.
 class CameraPoseEstimator {
 public:
     /// `model` outlives it. `camera`: index in the scene.
     CameraPoseEstimator(SceneModel& model, std::size_t camera, const CameraMethod& method, std::uint64_t seed);
+
+    CameraPoseEstimator(const CameraPoseEstimator&) = delete;  // history_ refers to camera_
+    CameraPoseEstimator& operator=(const CameraPoseEstimator&) = delete;
 
     [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
     /// `bytes`: in the camera's format. `t_ns`: mid-exposure, the time of `predicted`. Runs on the calling thread's
@@ -47,6 +52,7 @@ public:
 private:
     SceneModel& model_;
     Camera camera_;
+    FrameHistory history_{camera_};
     const CameraMethod& method_;
     std::unique_ptr<FrameEstimator> estimator_;
     std::uint64_t frames_ = 0;  ///< estimated so far

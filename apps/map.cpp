@@ -10,7 +10,9 @@
 
 #include "apps/cli.h"
 #include "apps/outputs.h"
+#include "apps/scene_argument.h"
 #include "apps/scene_options.h"
+#include "apps/warnings.h"
 #include "base/base64.h"
 #include "base/nearest_name.h"
 #include "base/write_file.h"
@@ -23,7 +25,8 @@ namespace narpa::cli {
 namespace {
 
 struct MapOptions {
-    std::string scene, camera, out, body, of = "depth";
+    SceneArgument scene;
+    std::string camera, out, body, of = "depth";
     PoseOptions pose;
     double time_s = 0, datum_m = 0;
     std::vector<double> up;  ///< empty: along z
@@ -87,7 +90,7 @@ std::vector<std::string> outputs_of(const MapOptions& o) {
 }
 
 Result<View> map_view(const MapOptions& o) {
-    auto scene = load_scene(o.scene);
+    auto scene = o.scene.load();
     if (!scene) return scene.error();
     if (auto kept = keep_inputs(outputs_of(o), *scene, {o.pose.trajectory}); !kept) return kept.error();
     const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
@@ -229,7 +232,7 @@ Command add_map(Parser app) {
     auto o = std::make_shared<MapOptions>();
     const Parser c =
         app.subcommand("map", "Map the depth or height of what a camera sees, with contour lines (docs/maps.md)");
-    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
+    o->scene.add_to(c);
     c.option("--camera", o->camera, "Name of the camera (default: the first)").type_name("NAME");
     c.option("--of", o->of,
              "depth: along the camera's axis; range: from the camera; height: along --up from the origin of the "

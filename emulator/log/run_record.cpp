@@ -88,6 +88,7 @@ Status write_run_record(const std::string& folder, const Scene& scene) {
     const json document{
         {"format", kFormat},
         {"scene", unknown ? scene.file : file.lexically_normal().string()},
+        {"set", scene.overrides},
         {"render",
          {{"method", r.method == Method::path ? kPath : kDirect}, {"max_depth", r.max_depth}, {"seed", r.seed}}}};
     return write_file(file_in(folder), document.dump(2) + '\n');
@@ -120,9 +121,13 @@ Result<RunRecord> read_run_record(const std::string& folder) {
         return error_at(file, text, found == std::string::npos ? 0 : found,
                         pointer.back() + ": expected " + expected);
     }
+    const json set = document.value("set", json::array());  // logs of earlier versions have none
+    if (!set.is_array() || !std::ranges::all_of(set, [](const json& v) { return v.is_string(); }))
+        return error_at(file, text, text.find("\"set\""), "set: expected an array of texts, KEY=VALUE");
     const json& render = document["render"];
-    return RunRecord{document["scene"], render["method"] == kPath ? Method::path : Method::direct,
-                     render["max_depth"], render["seed"]};
+    return RunRecord{document["scene"], set.get<std::vector<std::string>>(),
+                     render["method"] == kPath ? Method::path : Method::direct, render["max_depth"],
+                     render["seed"]};
 }
 
 }  // namespace narpa

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "renderer/scene/scene.h"
@@ -11,7 +12,8 @@ namespace narpa {
 /// The scene's file, and the keys of [render] that decide a frame's bytes together with its ledger, so that later
 /// changes of the file have no effect. Budgets are in each frame's ledger.
 struct RunRecord {
-    std::string scene_file;  ///< absolute
+    std::string scene_file;                ///< absolute
+    std::vector<std::string> overrides{};  ///< Scene::overrides
     RenderSettings::Method method{};
     int max_depth = 0;
     std::uint64_t seed = 0;

@@ -192,6 +192,7 @@ private:
         auto& line = emulator_.command.line;
         line = {program("narpa"),      "run",    scenario_.scene,       "--can", options_.bus, "--log",
                 in_folder("emulator"), "--seed", std::to_string(seed())};
+        append(line, "--set", scenario_.scene_overrides);
         append(line, "--video", video_);
         append(line, "--lidar", lidar_sinks_);
         if (!options_.real_time) line.emplace_back("--lockstep");
@@ -228,6 +229,7 @@ private:
                 {"LIDAR", fmt::format("{}", fmt::join(lidar_sources_, " "))},
                 {"SEED", std::to_string(seed())},
                 {"LOCKSTEP", options_.real_time ? "" : "1"},
+                {"SET", fmt::format("{}", fmt::join(scenario_.overrides, "\n"))},
                 {"LOG", options_.folder}};
     }
 
@@ -244,6 +246,7 @@ private:
         auto& line = p.command.line;
         if (replacement.empty()) {
             line = {program("narpa-" + name), scenario_.file, "--can", bus_name_};
+            append(line, "--set", scenario_.overrides);
             line.insert(line.end(), arguments.begin(), arguments.end());
             if (!options_.real_time) line.emplace_back("--lockstep");
             line.insert(line.end(), {"--seed", std::to_string(seed()), "--log", in_folder(name)});
@@ -299,6 +302,7 @@ private:
         record_ = {{"format", 1},
                    {"scenario", fs::absolute(scenario_.file).lexically_normal().string()},
                    {"scene", fs::absolute(scenario_.scene).lexically_normal().string()},
+                   {"set", scenario_.overrides},
                    {"scenario_hash", hash_},
                    {"mode", options_.real_time ? "real time" : "lockstep"},
                    {"seed", seed()},
@@ -451,7 +455,7 @@ private:
 
 Result<RehearsalResult> run_rehearsal(const RehearsalOptions& options, const Console& console,
                                       const StopFlag& stop) {
-    auto scenario = read_scenario(options.scenario);
+    auto scenario = read_scenario(options.scenario, options.overrides);
     if (!scenario) return scenario.error();
     return Rehearsal(options, console, stop, *std::move(scenario)).run();
 }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/file.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -11,6 +12,7 @@
 
 #include "base/write_file.h"
 #include "renderer/keys/toml_file.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -27,16 +29,24 @@ std::uint64_t fnv1a(std::string_view text, std::uint64_t hash = 0xcbf29ce4842223
 
 Result<ScenarioTexts> scenario_texts(const Scenario& scenario) {
     ScenarioTexts texts;
-    const auto read = [](const std::string& path, const char* head, std::string& out) -> Status {
-        const auto file = TomlFile::read(path, head);
+    std::vector<std::string> own_overrides = scenario.overrides;
+    std::erase_if(own_overrides, [&](const std::string& set) {
+        return std::ranges::find(scenario.scene_overrides, set) != scenario.scene_overrides.end();
+    });
+    const auto read = [](const std::string& path, const char* head, const TableKeys& keys,
+                         std::span<const std::string> overrides, std::string& out) -> Status {
+        const auto file = TomlFile::read(path, head, keys, overrides);
         if (!file) return file.error();
         out = file->text() + '\n';
         return Ok{};
     };
-    if (Status good = read(scenario.file, "scenario", texts.scenario); !good) return good.error();
-    if (Status good = read(scenario.scene, "scene", texts.scene); !good) return good.error();
+    if (Status good = read(scenario.file, "scenario", kScenarioFileKeys, own_overrides, texts.scenario); !good)
+        return good.error();
+    if (Status good = read(scenario.scene, "scene", kSceneFileKeys, scenario.scene_overrides, texts.scene); !good)
+        return good.error();
     if (const std::string& map = scenario.navigation.scene; !map.empty())
-        if (Status good = read(map, "scene", texts.map); !good) return good.error();
+        if (Status good = read(map, "scene", kSceneFileKeys, scenario.map_overrides, texts.map); !good)
+            return good.error();
     texts.hash = fmt::format("{:016x}", fnv1a(texts.map, fnv1a(texts.scene, fnv1a(texts.scenario))));
     return texts;
 }

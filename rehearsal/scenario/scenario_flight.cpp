@@ -130,11 +130,11 @@ bool same_names(const std::vector<Named>& a, const std::vector<Named>& b) {
 }
 
 /// Reads the map: another scene with the same bodies and sensors, of which only the shapes differ.
-std::string read_map(TableReader& table, const Scene& scene) {
+std::string read_map(TableReader& table, const Scenario& s, const Scene& scene) {
     const auto map = table.text("map");
     if (!map) return "";
-    std::string path = beside(table.place("map").file, *map);
-    const auto known = read_scene(path);
+    std::string path = beside(s.file, *map);
+    const auto known = read_scene(path, s.map_overrides);
     if (!known) {
         table.fail("map", known.error().text());
     } else if (!same_names(known->bodies, scene.bodies) || !same_names(known->cameras, scene.cameras) ||
@@ -157,7 +157,7 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     if (n.cameras.empty() && n.lidars.empty() && !over_ground)
         table->fail(table->has("lidars") ? "lidars" : "cameras",
                     "no sensor, expected a camera or a LiDAR to navigate by");
-    n.scene = read_map(*table, scene);
+    n.scene = read_map(*table, s, scene);
     table->read("map_sigma_m", n.map_sigma_m);
     table->read("map_correlation_m", n.map_correlation_m);
     table->read("period_s", n.period_s);

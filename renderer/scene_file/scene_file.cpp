@@ -8,6 +8,7 @@
 #include "renderer/keys/toml_override.h"
 #include "renderer/light/sky_kind.h"
 #include "renderer/material/bsdf_kind.h"
+#include "renderer/scene_file/doubtful_units.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -65,6 +66,7 @@ Result<Scene> read_files(const std::string& path, std::span<const std::string> o
     read_root(root, reading);
     if (!reading.problems.none()) return at_option(reading.problems.first());
     warn_of_dark_materials(reading.scene);
+    for (std::string& text : doubtful_units(reading.scene)) reading.scene.warnings.push_back(std::move(text));
     return std::move(reading.scene);
 }
 

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <map>
 
+#include "apps/body_views.h"
 #include "apps/calibration.h"
 #include "apps/cli.h"
 #include "apps/device_options.h"
@@ -231,9 +232,6 @@ void print_scene(const World& world) {
     say(fmt::format("scene \"{}\": {} bodies, {} triangles, {} materials, {} textures", s.name, s.bodies.size(),
                     world.tracer().triangle_count(), s.materials.size(), s.textures.size()));
     print_light(s);
-    for (const Body& b : s.bodies)
-        say(fmt::format("  body {}{}", b.name,
-                        b.can_id ? fmt::format(", commanded on CAN at 0x{:03X}", *b.can_id) : ""));
     for (const Camera& c : s.cameras)
         say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
                         1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
@@ -526,6 +524,7 @@ Outcome check(const CheckOptions& o) {
     if (!world) return world.error();
     print_scene(**world);
     nlohmann::json scene_document = describe(**world);
+    check_body_views(**world, scene_document);
     check_own_hulls(**world, scene_document);
     check_exposures(**world, scene_document);
     if (!o.calibration.empty()) {

@@ -13,11 +13,13 @@
 #include <filesystem>
 #include <map>
 
+#include "apps/body_views.h"
 #include "apps/calibration.h"
 #include "apps/cli.h"
 #include "apps/device_options.h"
 #include "apps/exposure_advice.h"
-#include "apps/shipped.h"
+#include "apps/scene_argument.h"
+#include "apps/warnings.h"
 #include "base/constants.h"
 #include "base/write_file.h"
 #include "drivers/can/can_bus.h"
@@ -34,6 +36,7 @@
 #include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/shape_kind.h"
 #include "renderer/keys/json_schema.h"
+#include "renderer/keys/shipped_file.h"
 #include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/lidar_description.h"
 #include "renderer/scene_file/scene_file.h"
@@ -42,7 +45,8 @@ namespace narpa::cli {
 namespace {
 
 struct CheckOptions {
-    std::string scene, dbc, calibration, schema;
+    SceneArgument scene;
+    std::string dbc, calibration, schema;
     std::vector<std::string> devices;
     DeviceOptions named;
 };
@@ -228,9 +232,6 @@ void print_scene(const World& world) {
     say(fmt::format("scene \"{}\": {} bodies, {} triangles, {} materials, {} textures", s.name, s.bodies.size(),
                     world.tracer().triangle_count(), s.materials.size(), s.textures.size()));
     print_light(s);
-    for (const Body& b : s.bodies)
-        say(fmt::format("  body {}{}", b.name,
-                        b.can_id ? fmt::format(", commanded on CAN at 0x{:03X}", *b.can_id) : ""));
     for (const Camera& c : s.cameras)
         say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
                         1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
@@ -313,10 +314,11 @@ void check_own_hull(const World& world, const std::string& sensor, const char* r
         document["own_hull_nearest_m"] = own.nearest_m;
         what += fmt::format(", from {:.3g} m on", own.nearest_m);
     }
-    say(own.share < much ? "  " + what
-                         : "warning: " + what +
-                               "; is it inside its hull? Move its position_m out of the mesh, or check its axes "
-                               "(camera: x right, y down, z forward; LiDAR: x right, y forward, z up)");
+    if (own.share < much) return say("  " + what);
+    warn(
+        what +
+        "; is it inside its hull? Move its position_m out of the mesh, or check its axes (camera: x right, y down, "
+        "z forward; LiDAR: x right, y forward, z up)");
 }
 
 void check_own_hulls(const World& world, nlohmann::json& document) {
@@ -363,7 +365,7 @@ void check_exposures(const World& world, nlohmann::json& document) {
         document["cameras"][i]["signal"] = signal_json(levels);
         const std::string camera = "camera " + s.cameras[i].name + ": ";
         if (const std::string advice = exposure_advice(s.cameras[i], levels); !advice.empty())
-            say("warning: " + camera + "at time 0 " + advice);
+            warn(camera + "at time 0 " + advice);
         else if (!(levels.brightest > 0))
             say("  " + camera + "sees no light at time 0, where the scene places its bodies");
         else
@@ -470,9 +472,8 @@ nlohmann::json describe(const rehearsal::Scenario& s) {
     say(fmt::format("scenario \"{}\": {}, at most {:g} s; its legs take about {:.0f} s", s.name, s.title,
                     s.duration_s, s.legs_duration_s()));
     if (s.legs_duration_s() > s.duration_s)
-        say(fmt::format(
-            "warning: the run ends before its legs are flown: expected duration_s of [scenario] above {:.0f}",
-            std::ceil(s.legs_duration_s())));
+        warn(fmt::format("the run ends before its legs are flown: expected duration_s of [scenario] above {:.0f}",
+                         std::ceil(s.legs_duration_s())));
     say(fmt::format("  scene: {}", s.scene));
     std::vector<std::string> sensors = n.cameras;
     if (n.camera_method != &camera_methods().front())
@@ -506,23 +507,24 @@ Outcome print_schema(const std::string& name) {
 
 Outcome check(const CheckOptions& o) {
     if (!o.schema.empty()) return print_schema(o.schema);
-    if (o.scene.empty()) return Error{"SCENE is required"};
+    if (o.scene.file.empty()) return Error{"SCENE is required"};
     nlohmann::json document;
-    std::string scene_file = o.scene;
-    if (const auto named = find_file(FileKind::scene, o.scene); !named) {
-        const auto scenario_file = find_file(FileKind::scenario, o.scene);
+    SceneArgument scene_argument = o.scene;
+    if (const auto named = find_file(FileKind::scene, o.scene.file); !named) {
+        const auto scenario_file = find_file(FileKind::scenario, o.scene.file);
         if (!scenario_file) return named.error();
-        const auto scenario = rehearsal::read_scenario(*scenario_file);
+        const auto scenario = rehearsal::read_scenario(*scenario_file, o.scene.sets);
         if (!scenario) return scenario.error();
         document["scenario"] = describe(*scenario);
-        scene_file = scenario->scene;
+        scene_argument = {scenario->scene, scenario->scene_overrides};
     }
-    auto scene = load_scene(scene_file);
+    auto scene = scene_argument.load_anyway();
     if (!scene) return scene.error();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
     print_scene(**world);
     nlohmann::json scene_document = describe(**world);
+    check_body_views(**world, scene_document);
     check_own_hulls(**world, scene_document);
     check_exposures(**world, scene_document);
     if (!o.calibration.empty()) {
@@ -568,7 +570,8 @@ Outcome check(const CheckOptions& o) {
 Command add_check(Parser app) {
     auto o = std::make_shared<CheckOptions>();
     const Parser c = app.subcommand("check", "Check a scene or scenario and this machine; names what is missing");
-    c.option("SCENE", o->scene, "Scene or scenario file (TOML), or a name that `narpa list` shows");
+    c.option("SCENE", o->scene.file, "Scene or scenario file (TOML), or a name that `narpa list` shows");
+    o->scene.add_settings_to(c);
     c.option("DEVICE", o->devices,
              "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, usb:, /dev/video10, "
              "bulk: ... One that may be several things, such as udp:, needs its option");

@@ -9,33 +9,18 @@
 #include <filesystem>
 
 #include "apps/print_error.h"
-#include "apps/shipped.h"
+#include "apps/warnings.h"
 #include "base/each_isa.h"
 #include "base/lanes.h"
 #include "generated/commit.h"
 #include "renderer/image/image_file.h"
-#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::cli {
-
-Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method) {
-    const auto file = find_file(FileKind::scene, path);
-    if (!file) return file.error();
-    auto scene = [&] {
-        const Progress progress("reading " + *file);
-        return read_scene(*file);
-    }();
-    if (!scene) return scene;
-    if (method)
-        if (const Status good = use_method(*scene, *method); !good) return good.error();
-    for (const std::string& w : scene->warnings) say("warning: " + w);
-    return scene;
-}
 
 Result<std::vector<std::uint8_t>> load_frame(const std::string& path, const Camera& camera) {
     std::vector<std::string> warnings;
     auto frame = read_frame(path, camera, &warnings);
-    for (const std::string& w : warnings) say("warning: " + w);
+    for (const std::string& w : warnings) warn(w);
     return frame;
 }
 
@@ -110,8 +95,11 @@ int finish(const Outcome& outcome, bool json) {
         if (json) print_json(to_json(outcome.error()));
         return exit_status(outcome.error().kind);
     }
+    const Status strict = check_warnings();
+    if (!strict) say("narpa: " + strict.error().text());
     if (json && !outcome->is_null() && !print_json(*outcome)) return exit_status(ErrorKind::failed);
     if (outcome->contains("error")) return (*outcome)["error"]["exit_status"];
+    if (!strict) return exit_status(strict.error().kind);
     return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;
 }
 

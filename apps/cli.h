@@ -50,9 +50,6 @@ int finish(const Outcome& outcome, bool json);
 
 /// {"error": ...}, with the exit status.
 nlohmann::json to_json(const Error& e);
-/// Reads a scene from a file, or the shipped one of this name, with another method than its own if one is given,
-/// and prints its warnings.
-Result<Scene> load_scene(const std::string& path, std::optional<RenderSettings::Method> method = {});
 /// Reads a frame as read_frame does, and prints its warnings.
 Result<std::vector<std::uint8_t>> load_frame(const std::string& path, const Camera& camera);
 /// Makes the folder of a file that is to be written; nothing where `file` is empty.

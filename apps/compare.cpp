@@ -8,6 +8,7 @@
 
 #include "apps/cli.h"
 #include "apps/outputs.h"
+#include "apps/scene_argument.h"
 #include "apps/scene_options.h"
 #include "base/write_file.h"
 #include "emulator/camera/camera_unit.h"
@@ -21,7 +22,8 @@ namespace narpa::cli {
 namespace {
 
 struct CompareOptions {
-    std::string scene, frame, camera, target, out;
+    SceneArgument scene;
+    std::string frame, camera, target, out;
     PoseOptions pose;
     double time_s = 0;
     int spp = 64, frame_spp = 0, threads = 0;
@@ -148,7 +150,7 @@ ExpectedFrame expected_frame(const CompareOptions& o, const World& world, std::s
 }
 
 Outcome compare(const CompareOptions& o) {
-    auto scene = load_scene(o.scene);
+    auto scene = o.scene.load();
     if (!scene) return scene.error();
     if (auto good = check_output(o, *scene); !good) return good.error();
     const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
@@ -193,7 +195,7 @@ Command add_compare(Parser app) {
     auto o = std::make_shared<CompareOptions>();
     const Parser c =
         app.subcommand("compare", "Compare a frame, also of a real camera, with a render of the scene");
-    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
+    o->scene.add_to(c);
     c.option("--frame", o->frame,
              "FILE.png, .tif or .pgm in the camera's size and format, or the bytes in FILE.raw")
         .type_name("FILE")

@@ -9,9 +9,10 @@
 #include <random>
 
 #include "apps/cli.h"
+#include "apps/scene_argument.h"
 #include "apps/scene_options.h"
-#include "apps/shipped.h"
 #include "apps/sweep_file.h"
+#include "apps/warnings.h"
 #include "base/write_file.h"
 #include "emulator/log/run_record.h"
 #include "emulator/replay/replay.h"
@@ -20,6 +21,7 @@
 #include "estimator/cloud/range_points.h"
 #include "estimator/search/cloud_search.h"
 #include "estimator/view/measured_image.h"
+#include "renderer/keys/shipped_file.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tracking/estimate_report.h"
 
@@ -27,7 +29,9 @@ namespace narpa::cli {
 namespace {
 
 struct EstimateOptions {
-    std::string input, sensor;  ///< the sensor's name; empty: the first
+    std::string input;
+    std::vector<std::string> sets;  ///< of the scene
+    std::string sensor;             ///< the sensor's name; empty: the first
     TrackerFlags tracker;
     int threads = 0;
 
@@ -127,7 +131,7 @@ Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_opt
 // --- One frame or one sweep in a file ---------------------------------------------------------------------------
 
 Result<std::unique_ptr<World>> world_of(const EstimateOptions& o, std::int64_t t_ns, std::int64_t until_ns) {
-    auto scene = load_scene(o.input);
+    auto scene = SceneArgument{o.input, o.sets}.load();
     if (!scene) return scene.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
     auto world = World::create(*std::move(scene));
@@ -279,7 +283,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     if (!target) return target.error();
     auto captured = read_sweep(o.sweep, *lidar.model, o.unit);
     if (!captured) return captured.error();
-    for (const std::string& warning : captured->warnings) say("warning: " + warning);
+    for (const std::string& warning : captured->warnings) warn(warning);
     LidarSweep& sweep = captured->sweep;
     BodyPoses then(scene.bodies.size());
     (*world)->place(t_ns, lidar.mount, then);
@@ -374,6 +378,8 @@ Command add_estimate(Parser app) {
     c.option("INPUT", o->input,
              "Folder that `run --log` or `rehearse` has written, or a scene with --frame or --sweep")
         .required();
+    SceneArgument::add_set_to(c, o->sets);
+    add_strict_to(c);
     c.option("--camera,--lidar", o->sensor, "Name of the camera or LiDAR (default: the first of the scene)")
         .type_name("NAME");
     c.option(
@@ -405,8 +411,8 @@ Command add_estimate(Parser app) {
     c.option("--csv", o->csv, "A row for each frame").type_name("FILE.csv");
     c.option("-o,--output", o->picture, "Errors over time, with three standard deviations and bound")
         .type_name("FILE.png");
-    for (const char* name :
-         {"--frame", "--sweep", "--time", "--unit", "--range-noise", "--no-truth", "--pose", "--trajectory"})
+    for (const char* name : {"--set", "--frame", "--sweep", "--time", "--unit", "--range-noise", "--no-truth",
+                             "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--method", "--frame-noise"}) o->only_of_frames.push_back(c.find(name));
     for (const char* name : {"--unit", "--range-noise"}) o->only_of_sweeps.push_back(c.find(name));

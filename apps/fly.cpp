@@ -14,6 +14,7 @@
 #include "emulator/clock.h"
 #include "emulator/trajectory.h"
 #include "protocols/can/messages.h"
+#include "renderer/keys/shipped_file.h"
 
 namespace narpa::cli {
 namespace {
@@ -254,7 +255,7 @@ Status check_log(const FlyOptions& o) {
 
 Outcome fly(const FlyOptions& o) {
     if (auto good = check_log(o); !good) return good.error();
-    auto rows = read_trajectory(o.trajectory);
+    auto rows = read_trajectory(own_or_shipped(o.trajectory));
     if (!rows) return rows.error();
     auto bodies = commanders(o, *rows);
     if (!bodies) return bodies.error();

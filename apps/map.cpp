@@ -10,7 +10,9 @@
 
 #include "apps/cli.h"
 #include "apps/outputs.h"
+#include "apps/scene_argument.h"
 #include "apps/scene_options.h"
+#include "apps/warnings.h"
 #include "base/base64.h"
 #include "base/nearest_name.h"
 #include "base/write_file.h"
@@ -23,7 +25,8 @@ namespace narpa::cli {
 namespace {
 
 struct MapOptions {
-    std::string scene, camera, out, body, of = "depth";
+    SceneArgument scene;
+    std::string camera, out, body, of = "depth";
     PoseOptions pose;
     double time_s = 0, datum_m = 0;
     std::vector<double> up;  ///< empty: along z
@@ -87,7 +90,7 @@ std::vector<std::string> outputs_of(const MapOptions& o) {
 }
 
 Result<View> map_view(const MapOptions& o) {
-    auto scene = load_scene(o.scene);
+    auto scene = o.scene.load();
     if (!scene) return scene.error();
     if (auto kept = keep_inputs(outputs_of(o), *scene, {o.pose.trajectory}); !kept) return kept.error();
     const auto index = sensor_named(scene->cameras, o.camera, "camera", scene->file);
@@ -95,6 +98,8 @@ Result<View> map_view(const MapOptions& o) {
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
     const auto quantity = read_quantity(o, *scene);
     if (!quantity) return quantity.error();
+    scene->atmosphere.reset();  // a map needs surfaces alone: no tables of light
+    scene->sky.reset();
     auto world = World::create(*std::move(scene));
     if (!world) return world.error();
     const std::int64_t t_ns = std::llround(o.time_s * 1e9);
@@ -112,12 +117,16 @@ Result<View> map_view(const MapOptions& o) {
         view.lowest_m = std::min(view.lowest_m, v), view.highest_m = std::max(view.highest_m, v);
         ++view.pixels;
     }
-    if (view.pixels == 0)
-        return Error{fmt::format("camera {} sees no surface{} from where it is; see its position_m, look_at or "
-                                 "attitude_wxyz, its mount, --pose and --time",
-                                 camera.name, o.body.empty() ? "" : " of body " + o.body),
-                     view.world->scene().file};
-    if (!o.interval_m) return view;
+    if (view.pixels == 0) {
+        const std::string what = fmt::format(
+            "camera {} sees no surface{} from where it is; see its position_m, look_at or attitude_wxyz, its "
+            "mount, "
+            "--pose and --time",
+            camera.name, o.body.empty() ? "" : " of body " + o.body);
+        if (o.body.empty()) return Error{what, view.world->scene().file};
+        warn("the map is empty: " + what);  // a mask of a body that is out of view
+    }
+    if (!o.interval_m || view.pixels == 0) return view;
     auto levels = contour_levels(view.lowest_m, view.highest_m, *o.interval_m);
     if (!levels) return Error{"--interval: " + levels.error().what};
     view.levels_m = *std::move(levels);
@@ -144,6 +153,11 @@ nlohmann::json to_json(const ContourLine& line, const SurfaceMap& map) {
             {"position_m", std::move(positions)}};
 }
 
+/// Extremes of an empty map are no numbers.
+nlohmann::json number_or_null(double x) {
+    return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(nullptr);
+}
+
 /// The document of the picture (python/narpa/plots/surface.py), which docs/maps.md describes.
 nlohmann::json to_json(const MapOptions& o, const View& view) {
     const ScalarField& field = view.map.quantity;
@@ -162,8 +176,8 @@ nlohmann::json to_json(const MapOptions& o, const View& view) {
         {"camera", view.camera},
         {"t_s", o.time_s},
         {"datum_m", o.datum_m},
-        {"lowest_m", view.lowest_m},
-        {"highest_m", view.highest_m},
+        {"lowest_m", number_or_null(view.lowest_m)},
+        {"highest_m", number_or_null(view.highest_m)},
         {"width", field.width},
         {"height", field.height},
         {"values_m", base64({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float)})},
@@ -204,20 +218,22 @@ Outcome map(const MapOptions& o) {
     const std::size_t points =
         std::accumulate(view->lines.begin(), view->lines.end(), std::size_t{0},
                         [](std::size_t n, const ContourLine& line) { return n + line.points.size(); });
-    if (o.interval_m && view->lines.empty())
-        say(
-            fmt::format("warning: no contour line: {} reaches from {:.6g} to {:.6g} m, and the lines would be at "
+    if (o.interval_m && view->lines.empty() && view->pixels > 0)
+        warn(
+            fmt::format("no contour line: {} reaches from {:.6g} to {:.6g} m, and the lines would be at "
                         "multiples of {:g} m",
                         o.of, view->lowest_m, view->highest_m, *o.interval_m));
-    say(fmt::format("wrote {}: {} x {}, {} from {:.6g} to {:.6g} m, {} levels, {} contour lines", o.out,
-                    field.width, field.height, o.of, view->lowest_m, view->highest_m, view->levels_m.size(),
-                    view->lines.size()));
+    const std::string extent =
+        view->pixels > 0 ? fmt::format("{} from {:.6g} to {:.6g} m", o.of, view->lowest_m, view->highest_m)
+                         : "no surface";
+    say(fmt::format("wrote {}: {} x {}, {}, {} levels, {} contour lines", o.out, field.width, field.height, extent,
+                    view->levels_m.size(), view->lines.size()));
     return nlohmann::json{{"file", o.out},
                           {"camera", view->camera},
                           {"of", o.of},
                           {"pixels", view->pixels},
-                          {"lowest_m", view->lowest_m},
-                          {"highest_m", view->highest_m},
+                          {"lowest_m", number_or_null(view->lowest_m)},
+                          {"highest_m", number_or_null(view->highest_m)},
                           {"levels_m", view->levels_m},
                           {"lines", view->lines.size()},
                           {"points", points}};
@@ -229,7 +245,7 @@ Command add_map(Parser app) {
     auto o = std::make_shared<MapOptions>();
     const Parser c =
         app.subcommand("map", "Map the depth or height of what a camera sees, with contour lines (docs/maps.md)");
-    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
+    o->scene.add_to(c);
     c.option("--camera", o->camera, "Name of the camera (default: the first)").type_name("NAME");
     c.option("--of", o->of,
              "depth: along the camera's axis; range: from the camera; height: along --up from the origin of the "

@@ -5,10 +5,12 @@
 
 #include "apps/cli.h"
 #include "apps/rehearsal_text.h"
-#include "apps/shipped.h"
+#include "apps/scene_argument.h"
+#include "apps/warnings.h"
 #include "rehearsal/runner/campaign.h"
 #include "rehearsal/runner/merge.h"
 #include "rehearsal/runner/rehearsal.h"
+#include "renderer/keys/shipped_file.h"
 
 namespace narpa::cli {
 namespace {
@@ -16,6 +18,7 @@ namespace {
 struct RehearseOptions {
     rehearsal::RehearsalOptions run;
     std::vector<std::string> video;
+    bool strict = false;
     std::size_t runs = 0;  ///< 0: one, without a summary
     int jobs = 1;
     bool replace = false;
@@ -59,6 +62,14 @@ Outcome many(const rehearsal::CampaignOptions& options) {
     return print_campaign(std::move(summary), options.run.folder);
 }
 
+/// With --strict, the warnings of the scene, which the emulator's log has otherwise, are an Error.
+Status warn_of_scene(const rehearsal::Scenario& scenario, bool strict) {
+    if (!strict) return Ok{};
+    const auto scene = SceneArgument{scenario.scene, scenario.scene_overrides}.load();
+    if (!scene) return scene.error();
+    return Ok{};
+}
+
 Outcome rehearse(const RehearseOptions& given) {
     rehearsal::RehearsalOptions o = given.run;
     if (!given.merge.empty()) {
@@ -76,8 +87,9 @@ Outcome rehearse(const RehearseOptions& given) {
     const auto file = find_file(FileKind::scenario, o.scenario);
     if (!file) return file.error();
     o.scenario = *file;
-    auto scenario = rehearsal::read_scenario(o.scenario);
+    auto scenario = rehearsal::read_scenario(o.scenario, o.overrides);
     if (!scenario) return scenario.error();
+    if (auto good = warn_of_scene(*scenario, given.strict); !good) return good.error();
     if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name + (given.runs > 0 ? "-campaign" : "");
     stop_on_signals();
     return given.runs > 0 ? many({o, given.runs, given.jobs, given.replace}) : one(o);
@@ -92,6 +104,8 @@ Command add_rehearse(Parser app) {
     const Parser c = app.subcommand(
         "rehearse", "Fly a scenario with dynamics, emulator and navigation in a closed loop, and apply its gates");
     c.option("SCENARIO", r.scenario, "Scenario file, or a name that `narpa list` shows (default: docking)");
+    SceneArgument::add_set_to(c, r.overrides);
+    const Option strict = add_strict_to(c);
     c.option(
          "-o,--output", r.folder,
          "Folder for page, verdict, logs (default: out/rehearsal/NAME, of the scenario's name; with --runs "
@@ -144,7 +158,10 @@ Command add_rehearse(Parser app) {
     c.examples({"narpa rehearse docking -o out/docking", "narpa rehearse realtime --real-time",
                 "narpa rehearse dispersions --runs 100 --jobs 2",
                 "narpa rehearse docking-camera --navigation 'python3 my_navigation.py $BUS $VIDEO'"});
-    return [o] { return rehearse(*o); };
+    return [o, strict] {
+        o->strict = strict.given();
+        return rehearse(*o);
+    };
 }
 
 }  // namespace narpa::cli

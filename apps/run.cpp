@@ -11,6 +11,7 @@
 
 #include "apps/cli.h"
 #include "apps/device_options.h"
+#include "apps/scene_argument.h"
 #include "apps/scene_options.h"
 #include "base/ready.h"
 #include "base/time.h"
@@ -26,7 +27,7 @@ namespace narpa::cli {
 namespace {
 
 struct RunCommandOptions {
-    std::string scene;
+    SceneArgument scene;
     DeviceOptions devices;
     std::string cpus;
     std::optional<std::uint64_t> seed;
@@ -124,7 +125,7 @@ Outcome run(const RunCommandOptions& options) {
         lock = *std::move(locked);
     }
     if (!o.lockstep) keep_heap();
-    auto scene = load_scene(options.scene);
+    auto scene = options.scene.load();
     if (!scene) return scene.error();
     options.budget.override_scene(scene->render);
     if (options.seed) scene->render.seed = *options.seed;
@@ -166,7 +167,7 @@ Command add_run(Parser app) {
     auto o = std::make_shared<RunCommandOptions>();
     const Parser c =
         app.subcommand("run", "Run the emulator: poses in on CAN, camera frames and LiDAR packets out");
-    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
+    o->scene.add_to(c);
     o->devices.add_to(c);
     const Option lockstep = c.flag("--lockstep", o->run.lockstep,
                                    "The clock advances only with commands; no wall time enters any result");

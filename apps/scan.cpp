@@ -10,6 +10,7 @@
 
 #include "apps/cli.h"
 #include "apps/outputs.h"
+#include "apps/scene_argument.h"
 #include "apps/scene_options.h"
 #include "base/time.h"
 #include "base/write_file.h"
@@ -21,7 +22,8 @@ namespace narpa::cli {
 namespace {
 
 struct ScanOptions {
-    std::string scene, lidar, out;
+    SceneArgument scene;
+    std::string lidar, out;
     PoseOptions pose;
     double time_s = 0, duration_s = 0;
 };
@@ -101,7 +103,7 @@ Outcome scan(const ScanOptions& o) {
     const std::string extension = std::filesystem::path(o.out).extension();
     if (extension != ".csv" && extension != ".ply" && extension != ".pcd" && extension != ".pcap")
         return Error{"unknown kind of file, expected .ply, .pcd, .csv or .pcap", o.out};
-    auto scene = load_scene(o.scene);
+    auto scene = o.scene.load();
     if (!scene) return scene.error();
     auto index = sensor_named(scene->lidars, o.lidar, "LiDAR", scene->file);
     if (!index) return index.error();
@@ -152,7 +154,7 @@ Command add_scan(Parser app) {
     auto o = std::make_shared<ScanOptions>();
     const Parser c =
         app.subcommand("scan", "Scan with a LiDAR: returns (the echoes of shots), all shots, or packets");
-    c.option("SCENE", o->scene, "Scene file (TOML), or a name that `narpa list` shows").required();
+    o->scene.add_to(c);
     c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)").type_name("NAME");
     c.option("--time", o->time_s, "Simulation time of the first packet")
         .type_name("SECONDS")
@@ -167,9 +169,8 @@ Command add_scan(Parser app) {
         .type_name("FILE")
         .required();
     c.group("Sensors");
-    c.examples(
-        {"narpa scan docking -o out/sweep.pcap",
-         "narpa scan docking --trajectory build/release/scenes/docking/approach.csv --time 30 -o out/cloud.ply"});
+    c.examples({"narpa scan docking -o out/sweep.pcap",
+                "narpa scan docking --trajectory docking/approach.csv --time 30 -o out/cloud.ply"});
     return [o] { return scan(*o); };
 }
 

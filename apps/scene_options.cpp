@@ -11,8 +11,9 @@
 #include <set>
 #include <utility>
 
+#include "apps/warnings.h"
 #include "base/nearest_name.h"
-#include "emulator/trajectory.h"
+#include "renderer/keys/shipped_file.h"
 
 namespace narpa::cli {
 namespace {
@@ -65,8 +66,8 @@ void warn_of_missing_times(const std::vector<TrajectoryRow>& rows, const std::st
         const auto [first, last] = times;
         const bool is_early = t_from_ns < first - stale_after_ns;
         if (!is_early && t_to_ns <= last + stale_after_ns) continue;
-        say(
-            fmt::format("warning: {}: has poses of body \"{}\" from {:g} to {:g} s, not at {:g} s; there it rests "
+        warn(
+            fmt::format("{}: has poses of body \"{}\" from {:g} to {:g} s, not at {:g} s; there it rests "
                         "near the {} of them",
                         file, body, static_cast<double>(first) * 1e-9, static_cast<double>(last) * 1e-9,
                         static_cast<double>(is_early ? t_from_ns : t_to_ns) * 1e-9, is_early ? "first" : "last"));
@@ -122,10 +123,10 @@ Status PoseOptions::place(Scene& scene) const {
     return Ok{};
 }
 
-Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to_ns) const {
-    if (trajectory.empty()) return Ok{};
-    auto rows = read_trajectory(trajectory);
-    if (!rows) return rows.error();
+Result<std::vector<TrajectoryRow>> PoseOptions::rows() const {
+    if (trajectory.empty()) return std::vector<TrajectoryRow>{};
+    auto rows = read_trajectory(own_or_shipped(trajectory));
+    if (!rows) return rows;
     for (const std::string& text : poses) {
         const std::string body = text.substr(0, text.find('='));
         const auto row = std::ranges::find(*rows, body, &TrajectoryRow::body);
@@ -134,9 +135,21 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
                 fmt::format("has poses of body \"{}\", and --pose has another, expected only one of the two", body),
                 trajectory, row->line};
     }
-    if (auto loaded = world.load(*rows, t_from_ns, t_to_ns); !loaded) return loaded;
-    warn_of_missing_times(*rows, trajectory, t_from_ns, t_to_ns, world.scene().render.stale_after_s);
+    return rows;
+}
+
+Status PoseOptions::load(World& world, const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns,
+                         std::int64_t t_to_ns) const {
+    if (trajectory.empty()) return Ok{};
+    if (auto loaded = world.load(rows, t_from_ns, t_to_ns); !loaded) return loaded;
+    warn_of_missing_times(rows, trajectory, t_from_ns, t_to_ns, world.scene().render.stale_after_s);
     return Ok{};
+}
+
+Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to_ns) const {
+    const auto all = rows();
+    if (!all) return all.error();
+    return load(world, *all, t_from_ns, t_to_ns);
 }
 
 Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::string& option, double* distortion) {

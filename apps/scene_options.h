@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/cli.h"
+#include "emulator/trajectory.h"
 #include "emulator/world.h"
 #include "tracking/frame_tracker.h"
 
@@ -31,6 +32,11 @@ struct PoseOptions {
     /// Apply --pose to the scene, before the world is made, and --trajectory to the world.
     [[nodiscard]] Status place(Scene& scene) const;
     [[nodiscard]] Status load(World& world, std::int64_t t_from_ns, std::int64_t t_to_ns) const;
+    /// The rows of --trajectory, without bodies that --pose has placed; none without it.
+    [[nodiscard]] Result<std::vector<TrajectoryRow>> rows() const;
+    /// Warns of bodies without a pose in the rows at a time between these two, and places the others.
+    [[nodiscard]] Status load(World& world, const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns,
+                              std::int64_t t_to_ns) const;
 };
 
 /// Parses NAME=VALUE pairs, separated by commas. Names: those of kModelErrors, and `distortion` where that pointer

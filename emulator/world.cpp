@@ -54,10 +54,11 @@ void World::find_moving() {
 
 Status World::load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns) {
     std::vector<const TrajectoryRow*> before(scene_.bodies.size(), nullptr);
-    std::vector<bool> past_end(scene_.bodies.size(), false);
+    std::vector<bool> past_end(scene_.bodies.size(), false), is_new(scene_.bodies.size(), false);
     const auto take = [&](std::size_t body, const TrajectoryRow& row) {
-        if (!tracks_[body])
+        if (!is_new[body])
             tracks_[body] = std::make_unique<PoseTrack>(scene_.bodies[body].initial, scene_.render.stale_after_s);
+        is_new[body] = true;
         return tracks_[body]->push({0, row.t_ns, row.motion}, t_from_ns) == TrackStatus::taken;
     };
     for (const TrajectoryRow& row : rows) {

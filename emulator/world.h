@@ -36,7 +36,7 @@ public:
     [[nodiscard]] bool has_commanded_bodies() const noexcept { return commanded_ > 0; }
 
     /// For a single image or scan: takes the rows of a trajectory that matter between two times as commands.
-    /// Other bodies keep the scene's own motion.
+    /// Other bodies keep the scene's own motion. A later call replaces the commands of the bodies that it names.
     Status load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns);
 
     /// Computes every body's pose at t. `rider`: the body whose command the returned source names, if it has one (a

@@ -8,6 +8,7 @@
 #include "drivers/can/can_bus.h"
 #include "drivers/can/remote_clock.h"
 #include "rehearsal/dynamics/node.h"
+#include "renderer/keys/shipped_file.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -16,13 +17,16 @@ constexpr int kDynamicsPriority = 55;  ///< in real time; below the emulator's C
 
 struct Arguments {
     std::string scenario, bus;
+    std::vector<std::string> overrides;
     std::optional<std::uint64_t> seed;
     DynamicsOptions options;
     int ready_fd = -1;
 };
 
 Status simulate(Arguments& a) {
-    auto scenario = read_scenario(a.scenario);
+    const auto file = find_file(FileKind::scenario, a.scenario);
+    if (!file) return file.error();
+    auto scenario = read_scenario(*file, a.overrides);
     if (!scenario) return scenario.error();
     a.options.seed = a.seed.value_or(scenario->seed);
     stop_on_signals();
@@ -38,7 +42,10 @@ Status simulate(Arguments& a) {
 }
 
 void add_options(Arguments& a, const cli::Parser& p) {
-    p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
+    p.option("SCENARIO", a.scenario, "Scenario file (TOML), or a name that `narpa list` shows").required();
+    p.option("--set", a.overrides, "Value of a key of the scenario or its scene, as `narpa rehearse` takes it")
+        .type_name("KEY=VALUE")
+        .repeatable();
     p.option("--can", a.bus, can_bus_help()).type_name("BUS").required();
     p.flag("--lockstep", a.options.lockstep,
            "Each control period waits for its actuator command; the same seed gives the same bytes");
@@ -53,7 +60,7 @@ void add_options(Arguments& a, const cli::Parser& p) {
         .type_name("SECONDS")
         .range(0.1, 86400.0)
         .shows_default();
-    p.examples({"narpa-dynamics build/release/scenes/rehearsal/docking-camera.toml --can slcan:29537 --lockstep"});
+    p.examples({"narpa-dynamics docking-camera --can slcan:29537 --lockstep"});
 }
 
 }  // namespace

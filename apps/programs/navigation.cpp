@@ -8,13 +8,14 @@
 #include "drivers/can/can_bus.h"
 #include "drivers/video/video_source.h"
 #include "rehearsal/navigation/node.h"
+#include "renderer/keys/shipped_file.h"
 
 namespace narpa::rehearsal {
 namespace {
 
 struct Arguments {
     std::string scenario;
-    std::vector<std::string> video, lidar;
+    std::vector<std::string> overrides, video, lidar;
     int threads = 0, ready_fd = -1;
     NodeOptions node;
 };
@@ -36,7 +37,9 @@ Status run(Arguments& a) {
     auto lidar = pairs(a.lidar, "--lidar", "LIDAR=SOURCE, like top=udp:2368");
     if (!lidar) return lidar.error();
     a.node.video = *std::move(video), a.node.lidar = *std::move(lidar);
-    const auto scenario = read_scenario(a.scenario);
+    const auto file = find_file(FileKind::scenario, a.scenario);
+    if (!file) return file.error();
+    const auto scenario = read_scenario(*file, a.overrides);
     if (!scenario) return scenario.error();
     std::optional<tbb::global_control> limit;
     if (a.threads > 0)
@@ -50,7 +53,10 @@ Status run(Arguments& a) {
 }
 
 void add_options(Arguments& a, const cli::Parser& p) {
-    p.option("SCENARIO", a.scenario, "Scenario file (TOML)").required();
+    p.option("SCENARIO", a.scenario, "Scenario file (TOML), or a name that `narpa list` shows").required();
+    p.option("--set", a.overrides, "Value of a key of the scenario or its scene, as `narpa rehearse` takes it")
+        .type_name("KEY=VALUE")
+        .repeatable();
     p.option("--can", a.node.bus, can_bus_help()).type_name("BUS").required();
     p.option("--video", a.video, video_source_help() + ", for each of the scenario's cameras")
         .type_name("CAMERA=SOURCE")
@@ -68,7 +74,7 @@ void add_options(Arguments& a, const cli::Parser& p) {
     p.option("--log", a.node.log, "Folder for navigation.csv, measurements.csv, navigation.json and pictures")
         .type_name("DIR");
     p.examples(
-        {"narpa-navigation build/release/scenes/rehearsal/docking-camera.toml --can slcan:29537 --video "
+        {"narpa-navigation docking-camera --can slcan:29537 --video "
          "nav=out/nav --lockstep"});
 }
 

@@ -11,6 +11,7 @@
 #include "bench/flight.h"
 #include "bench/loop.h"
 #include "emulator/realtime.h"
+#include "renderer/keys/shipped_file.h"
 
 namespace narpa::cli {
 namespace {
@@ -66,7 +67,7 @@ Result<std::vector<LoopRun>> measure(const LoopBenchOptions& o, const Scene& sce
 Result<std::optional<RecordedFlight>> prepare_flight(LoopBenchOptions& o, const Scene& scene) {
     if (o.duration_s) o.run.duration_s = *o.duration_s;
     if (o.trajectory.empty()) return std::optional<RecordedFlight>{};
-    auto rows = read_trajectory(o.trajectory);
+    auto rows = read_trajectory(own_or_shipped(o.trajectory));
     if (!rows) return rows.error();
     const std::vector<TrajectoryRow> flown = there_and_back(*std::move(rows));
     if (!o.duration_s) o.run.duration_s = std::max(1.0, static_cast<double>(flown.back().t_ns) * 1e-9);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/cli.h"
+#include "apps/scene_argument.h"
 #include "base/program_beside.h"
 #include "renderer/camera/scene_camera.h"
 
@@ -21,10 +21,10 @@ Result<std::string> shipped_scene(const std::string& name) {
 
 Result<Scene> scene_or_shipped(const std::string& file, const std::string& shipped,
                                std::optional<RenderSettings::Method> method) {
-    if (!file.empty()) return load_scene(file, method);
+    if (!file.empty()) return SceneArgument{file, {}}.load(method);
     auto found = shipped_scene(shipped);
     if (!found) return found.error();
-    return load_scene(*found, method);
+    return SceneArgument{*found, {}}.load(method);
 }
 
 void resize(Camera& c, int width, int height) {

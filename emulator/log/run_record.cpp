@@ -17,6 +17,7 @@
 #include "base/fnv1a.h"
 #include "base/write_file.h"
 #include "renderer/keys/toml_file.h"
+#include "renderer/scene_file/scene_file.h"
 #include "renderer/scene_file/scene_inputs.h"
 
 namespace narpa {
@@ -130,13 +131,14 @@ Status remove_run(const std::string& folder) {
 }
 
 Status write_run_record(const std::string& folder, const Scene& scene) {
-    const auto text = TomlFile::read(scene.file, "scene");
+    const auto text = TomlFile::read(scene.file, "scene", kSceneFileKeys, scene.overrides);
     if (!text) return text.error();
     if (Status written = write_file(folder + "/scene.toml", text->text() + '\n'); !written) return written;
     const RenderSettings& r = scene.render;
     const json document{
         {"format", kFormat},
         {"scene", absolute(scene.file)},
+        {"set", scene.overrides},
         {"files", recorded_files(scene)},
         {"render",
          {{"method", r.method == Method::path ? kPath : kDirect}, {"max_depth", r.max_depth}, {"seed", r.seed}}}};
@@ -171,9 +173,15 @@ Result<RunRecord> read_run_record(const std::string& folder) {
         return error_at(file, text, found == std::string::npos ? 0 : found,
                         pointer.back() + ": expected " + expected);
     }
+    const json set = document.value("set", json::array());  // logs of earlier versions have none
+    if (!set.is_array() || !std::ranges::all_of(set, [](const json& v) { return v.is_string(); }))
+        return error_at(file, text, text.find("\"set\""), "set: expected an array of texts, KEY=VALUE");
     const json& render = document["render"];
-    return RunRecord{document["scene"], render["method"] == kPath ? Method::path : Method::direct,
-                     render["max_depth"], render["seed"],
+    return RunRecord{document["scene"],
+                     set.get<std::vector<std::string>>(),
+                     render["method"] == kPath ? Method::path : Method::direct,
+                     render["max_depth"],
+                     render["seed"],
                      document.contains("files") ? file_list(document["files"]) : std::vector<RecordedFile>()};
 }
 

@@ -22,7 +22,8 @@ struct RecordedFile {
 };
 
 struct RunRecord {
-    std::string scene_file;  ///< absolute
+    std::string scene_file;                ///< absolute
+    std::vector<std::string> overrides{};  ///< Scene::overrides
     RenderSettings::Method method{};
     int max_depth = 0;
     std::uint64_t seed = 0;

@@ -124,7 +124,7 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const st
                                              const std::string& scene_file) {
     const auto record = read_run_record(folder);
     if (!record) return record.error();
-    auto scene = read_scene(scene_file.empty() ? record->scene_file : scene_file);
+    auto scene = read_scene(scene_file.empty() ? record->scene_file : scene_file, record->overrides);
     if (!scene) return scene.error();
     if (auto good = use_method(*scene, record->method); !good) return good.error();
     scene->render.max_depth = record->max_depth;

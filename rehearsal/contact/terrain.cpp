@@ -11,7 +11,7 @@
 namespace narpa::rehearsal {
 
 Result<std::unique_ptr<const Terrain>> Terrain::create(const Scenario& scenario) {
-    auto scene = read_scene(scenario.scene);
+    auto scene = read_scene(scenario.scene, scenario.scene_overrides);
     if (!scene) return scene.error();
     std::unique_ptr<Terrain> t(new Terrain(*std::move(scene)));
     auto tracer = Tracer::create(t->scene_);

@@ -56,6 +56,7 @@ ChildProcess::Command command_for(const CampaignOptions& o, const std::string& f
               "--patience",
               fmt::format("{:g}", r.patience_s)};
     c.line.insert(c.line.end(), {"--can", r.bus});
+    for (const std::string& set : r.overrides) c.line.insert(c.line.end(), {"--set", set});
     for (const auto& [camera, device] : r.video) c.line.insert(c.line.end(), {"--video", camera + "=" + device});
     if (r.real_time) c.line.emplace_back("--real-time");
     if (r.keep_frames) c.line.emplace_back("--keep-frames");
@@ -129,7 +130,7 @@ Result<json> run_campaign(const CampaignOptions& o, const Console& console, cons
     if (o.run.dynamics == "none" || o.run.navigation == "none")
         return Error{
             "many runs with a program \"none\" that you start: expected a command that starts it for each run"};
-    const auto scenario = read_scenario(o.run.scenario);
+    const auto scenario = read_scenario(o.run.scenario, o.run.overrides);
     if (!scenario) return scenario.error();
     const auto texts = scenario_texts(*scenario);
     if (!texts) return texts.error();

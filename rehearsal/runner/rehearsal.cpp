@@ -190,6 +190,7 @@ private:
         auto& line = emulator_.command.line;
         line = {program("narpa"),      "run",    scenario_.scene,       "--can", options_.bus, "--log",
                 in_folder("emulator"), "--seed", std::to_string(seed())};
+        append(line, "--set", scenario_.scene_overrides);
         append(line, "--video", video_);
         if (options_.keep_frames)
             for (const std::string& camera : scenario_.navigation.cameras)
@@ -229,6 +230,7 @@ private:
                 {"LIDAR", fmt::format("{}", fmt::join(lidar_sources_, " "))},
                 {"SEED", std::to_string(seed())},
                 {"LOCKSTEP", options_.real_time ? "" : "1"},
+                {"SET", fmt::format("{}", fmt::join(scenario_.overrides, "\n"))},
                 {"LOG", options_.folder}};
     }
 
@@ -245,6 +247,7 @@ private:
         auto& line = p.command.line;
         if (replacement.empty()) {
             line = {program("narpa-" + name), scenario_.file, "--can", bus_name_};
+            append(line, "--set", scenario_.overrides);
             line.insert(line.end(), arguments.begin(), arguments.end());
             if (!options_.real_time) line.emplace_back("--lockstep");
             line.insert(line.end(), {"--seed", std::to_string(seed()), "--log", in_folder(name)});
@@ -301,6 +304,7 @@ private:
                    {"scenario", whole_path(scenario_.file)},
                    {"scene", whole_path(scenario_.scene)},
                    {"map", scenario_.navigation.scene.empty() ? "" : whole_path(scenario_.navigation.scene)},
+                   {"set", scenario_.overrides},
                    {"scenario_hash", hash_},
                    {"mode", options_.real_time ? "real time" : "lockstep"},
                    {"seed", seed()},
@@ -449,7 +453,7 @@ private:
 
 Result<RehearsalResult> run_rehearsal(const RehearsalOptions& options, const Console& console,
                                       const StopFlag& stop) {
-    auto scenario = read_scenario(options.scenario);
+    auto scenario = read_scenario(options.scenario, options.overrides);
     if (!scenario) return scenario.error();
     return Rehearsal(options, console, stop, *std::move(scenario)).run();
 }

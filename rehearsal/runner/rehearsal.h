@@ -18,9 +18,10 @@
 namespace narpa::rehearsal {
 
 struct RehearsalOptions {
-    std::string scenario;               ///< file
-    std::string folder;                 ///< for everything that is written
-    std::optional<std::uint64_t> seed;  ///< of dispersions and all noise; default: the scenario's
+    std::string scenario;                  ///< file
+    std::vector<std::string> overrides{};  ///< KEY=VALUE: read_scenario
+    std::string folder;                    ///< for everything that is written
+    std::optional<std::uint64_t> seed;     ///< of dispersions and all noise; default: the scenario's
     bool real_time = false;
     std::string bus = "slcan:0";               ///< as `narpa run --can`
     std::map<std::string, std::string> video;  ///< camera -> device, in place of a FIFO in the folder

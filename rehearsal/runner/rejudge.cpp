@@ -12,6 +12,8 @@
 #include "rehearsal/runner/run_folder.h"
 #include "rehearsal/runner/run_results.h"
 #include "renderer/keys/toml_file.h"
+#include "renderer/keys/toml_override.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -25,7 +27,9 @@ json document(const std::string& file) {
 
 /// Replaces the gates by those of another file of the same scenario.
 Status take_gates(const std::string& folder, const std::string& file, Scenario& flown) {
-    auto other = read_scenario(file);
+    std::vector<std::string> set = flown.overrides;
+    std::erase_if(set, [](const std::string& s) { return table_of_override(s) == "gates"; });
+    auto other = read_scenario(file, set);
     if (!other) return other.error();
     const auto difference = difference_from_flown(folder, *other);
     if (!difference) return difference.error();
@@ -43,9 +47,11 @@ Status take_gates(const std::string& folder, const std::string& file, Scenario& 
 }  // namespace
 
 Result<Scenario> flown_scenario(const std::string& folder, const json& record) {
-    auto scenario = read_scenario(folder + "/scenario.toml", {record.value("scene", ""), record.value("map", "")});
+    const auto set = record.value("set", std::vector<std::string>());
+    auto scenario =
+        read_scenario(folder + "/scenario.toml", set, {record.value("scene", ""), record.value("map", "")});
     if (!scenario) return scenario;
-    const auto scene = TomlFile::read(scenario->scene, "scene");
+    const auto scene = TomlFile::read(scenario->scene, "scene", kSceneFileKeys, scenario->scene_overrides);
     if (!scene) return scene.error();
     if (scene->text() + '\n' != read_text(folder + "/scene.toml"))
         return Error{fmt::format("has changed since it was flown, expected what stands in {}/scene.toml", folder),

@@ -114,14 +114,24 @@ std::string describe_message(const Scenario& s, const std::string& line) {
                        line.substr(line.rfind(' ') + 1));
 }
 
+namespace {
+
+/// Absent, or a list of texts: logs of earlier versions have none.
+bool is_list_of_texts(const json& record, const char* key) {
+    if (!record.contains(key)) return true;
+    return record[key].is_array() && std::ranges::all_of(record[key], [](const json& v) { return v.is_string(); });
+}
+
+}  // namespace
+
 Result<json> read_record(const std::string& folder) {
     const std::string file = folder + "/rehearsal.json";
     json record = json::parse(read_text(file), nullptr, false);
     const auto is_text = [&](const char* key) { return record.contains(key) && record[key].is_string(); };
     const bool good = record.is_object() && record.contains("format") && record["format"] == 1 &&
                       is_text("scenario") && is_text("scenario_hash") && is_text("mode") &&
-                      record.contains("seed") && record["seed"].is_number_unsigned() && is_text("dynamics") &&
-                      is_text("navigation");
+                      is_list_of_texts(record, "set") && record.contains("seed") &&
+                      record["seed"].is_number_unsigned() && is_text("dynamics") && is_text("navigation");
     if (!good) return Error{"is not the record of a rehearsal", file};
     return record;
 }
@@ -159,7 +169,8 @@ Result<json> rerun(const RerunOptions& options, const Console& console, const St
     if (!dynamics) return dynamics.error();
     const auto navigation = replacement(*record, folder, "navigation", options.navigation);
     if (!navigation) return navigation.error();
-    const auto scenario = read_scenario((*record)["scenario"].get<std::string>());
+    const auto overrides = record->value("set", std::vector<std::string>{});
+    const auto scenario = read_scenario((*record)["scenario"].get<std::string>(), overrides);
     if (!scenario) return scenario.error();
     const auto texts = scenario_texts(*scenario);
     if (!texts) return texts.error();
@@ -173,6 +184,7 @@ Result<json> rerun(const RerunOptions& options, const Console& console, const St
     const TemporaryFolder again;
     RehearsalOptions o;
     o.scenario = scenario->file;
+    o.overrides = overrides;
     o.folder = again.path();
     o.seed = (*record)["seed"].get<std::uint64_t>();
     o.dynamics = *dynamics;

@@ -4,17 +4,21 @@
 #include <fmt/format.h>
 #include <sys/file.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <set>
+#include <sstream>
 
 #include "base/fnv1a.h"
 #include "base/write_file.h"
 #include "rehearsal/runner/child_process.h"
 #include "renderer/keys/toml_file.h"
+#include "renderer/scene_file/scene_file.h"
 
 namespace narpa::rehearsal {
 namespace {
@@ -25,36 +29,62 @@ namespace fs = std::filesystem;
 constexpr std::array<const char*, 3> kMarks{"rehearsal.json", "runs", "summary.json"};
 constexpr std::array<const char*, 3> kKindNames{"a single run", "a campaign", "a summary of campaigns"};
 
+/// The overrides of the scenario itself, not of its scene.
+std::vector<std::string> own_overrides(const Scenario& scenario) {
+    std::vector<std::string> own = scenario.overrides;
+    std::erase_if(own, [&](const std::string& set) {
+        return std::ranges::find(scenario.scene_overrides, set) != scenario.scene_overrides.end();
+    });
+    return own;
+}
+
+/// A table's text without the name of the map, which depends on the scenario's folder.
+std::string without_map(const std::string& table) {
+    std::istringstream lines(table);
+    std::string out;
+    for (std::string line; std::getline(lines, line);)
+        if (!line.starts_with("map = ")) out += line + '\n';
+    return out;
+}
+
 }  // namespace
 
 Result<ScenarioTexts> scenario_texts(const Scenario& scenario) {
     ScenarioTexts texts;
-    const auto read = [](const std::string& path, const char* head, std::string& out) -> Status {
-        const auto file = TomlFile::read(path, head);
+    const auto read = [](const std::string& path, const char* head, const TableKeys& keys,
+                         std::span<const std::string> overrides, std::string& out) -> Status {
+        const auto file = TomlFile::read(path, head, keys, overrides);
         if (!file) return file.error();
         out = file->text() + '\n';
         return Ok{};
     };
-    if (Status good = read(scenario.file, "scenario", texts.scenario); !good) return good.error();
-    if (Status good = read(scenario.scene, "scene", texts.scene); !good) return good.error();
+    if (Status good = read(scenario.file, "scenario", kScenarioFileKeys, own_overrides(scenario), texts.scenario);
+        !good)
+        return good.error();
+    if (Status good = read(scenario.scene, "scene", kSceneFileKeys, scenario.scene_overrides, texts.scene); !good)
+        return good.error();
     if (const std::string& map = scenario.navigation.scene; !map.empty())
-        if (Status good = read(map, "scene", texts.map); !good) return good.error();
+        if (Status good = read(map, "scene", kSceneFileKeys, scenario.map_overrides, texts.map); !good)
+            return good.error();
     texts.hash = fmt::format("{:016x}", fnv1a(texts.map, fnv1a(texts.scene, fnv1a(texts.scenario))));
     return texts;
 }
 
 Result<std::string> difference_from_flown(const std::string& folder, const Scenario& scenario) {
-    const auto flown = TomlFile::read(folder + "/scenario.toml", "scenario");
+    const auto flown = TomlFile::read(folder + "/scenario.toml", "scenario", kScenarioFileKeys);
     if (!flown) return flown.error();
-    const auto now = TomlFile::read(scenario.file, "scenario");
+    const auto now = TomlFile::read(scenario.file, "scenario", kScenarioFileKeys, own_overrides(scenario));
     if (!now) return now.error();
     const auto texts = scenario_texts(scenario);
     if (!texts) return texts.error();
     std::vector<std::string> differ;
-    std::map<std::string, std::string> a = flown->tables(), b = now->tables();
-    a.merge(std::map(b));
-    for (const auto& [name, text] : a)
-        if (name != "scenario" && flown->tables()[name] != b[name]) differ.push_back("[" + name + "]");
+    std::map<std::string, std::string> was = flown->tables(), is = now->tables();
+    std::set<std::string> names;
+    for (const auto* tables : {&was, &is})
+        for (const auto& [name, text] : *tables) names.insert(name);
+    names.erase("scenario");
+    for (const std::string& name : names)
+        if (without_map(was[name]) != without_map(is[name])) differ.push_back("[" + name + "]");
     if (read_text(folder + "/scene.toml") != texts->scene) differ.emplace_back("the scene");
     if (!texts->map.empty() && read_text(folder + "/map.toml") != texts->map) differ.emplace_back("the map");
     return fmt::format("{}", fmt::join(differ, ", "));

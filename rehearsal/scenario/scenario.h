@@ -162,7 +162,10 @@ struct Gates {
 
 struct Scenario {
     std::string file, name, title;
-    std::string scene;  ///< path of the scene file
+    std::string scene;                           ///< path of the scene file
+    std::vector<std::string> overrides{};        ///< KEY=VALUE of `--set`, of the scenario and its scene
+    std::vector<std::string> scene_overrides{};  ///< those of the scene
+    std::vector<std::string> map_overrides{};    ///< those of Navigation::scene: all but those of bodies
     double duration_s = 600;
     double pose_rate_hz = 20;  ///< of pose commands; a multiple of 1 / navigation.period_s
     std::uint64_t seed = 1;    ///< of run 1; run k has seed + k - 1
@@ -206,7 +209,9 @@ struct ScenarioFiles {
     std::string scene{}, map{};
 };
 
+/// `overrides`: values of single keys of the scenario and of its scene, KEY=VALUE (renderer/keys/toml_override.h).
 /// Errors name file, line, column, what is wrong and what was expected.
-Result<Scenario> read_scenario(const std::string& path, const ScenarioFiles& files = {});
+Result<Scenario> read_scenario(const std::string& path, std::span<const std::string> overrides = {},
+                               const ScenarioFiles& files = {});
 
 }  // namespace narpa::rehearsal

@@ -2,6 +2,7 @@
 
 #include "rehearsal/scenario/scenario_tables.h"
 #include "renderer/keys/toml_file.h"
+#include "renderer/keys/toml_override.h"
 #include "renderer/scene/mounting.h"
 #include "renderer/scene_file/scene_file.h"
 
@@ -52,12 +53,12 @@ std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problem
     const FilePlace place = table->place("scene");
     table->finish();
     if (!scene) return std::nullopt;
-    if (s.scene.empty()) s.scene = beside(place.file, *scene);
+    if (s.scene.empty()) s.scene = beside(s.file, *scene);
     if (std::error_code error; !std::filesystem::exists(s.scene, error)) {
         problems.add(place, "scene: " + s.scene + ": no such file");
         return std::nullopt;
     }
-    auto read = read_scene(s.scene);
+    auto read = read_scene(s.scene, s.scene_overrides);
     if (read) return *std::move(read);
     problems.add(place, read.error());
     return std::nullopt;
@@ -78,17 +79,26 @@ void read_root(TableReader& root, Scenario& s, Problems& problems) {
 
 constinit const TableKeys kScenarioFileKeys{.rows = kScenarioFileRows};
 
-Result<Scenario> read_scenario(const std::string& path, const ScenarioFiles& files) {
+Result<Scenario> read_scenario(const std::string& path, std::span<const std::string> overrides,
+                               const ScenarioFiles& files) {
     Scenario s;
     s.file = path;
     s.scene = files.scene;
     s.navigation.scene = files.map;
+    s.overrides.assign(overrides.begin(), overrides.end());
+    std::vector<std::string> own_overrides;
+    for (const std::string& set : overrides) {
+        const std::string_view table = table_of_override(set);
+        const bool is_of_scene = !kScenarioFileKeys.find(table) && kSceneFileKeys.find(table);
+        (is_of_scene ? s.scene_overrides : own_overrides).push_back(set);
+        if (is_of_scene && table != "body") s.map_overrides.push_back(set);
+    }
     Problems problems(path);
-    const auto file = TomlFile::read(path, "scenario");
+    const auto file = TomlFile::read(path, "scenario", kScenarioFileKeys, own_overrides);
     if (!file) return file.error();
     TableReader root = file->root("the scenario", problems, &kScenarioFileKeys);
     read_root(root, s, problems);
-    if (!problems.none()) return problems.first();
+    if (!problems.none()) return at_option(problems.first());
     return s;
 }
 

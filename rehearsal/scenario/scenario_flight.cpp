@@ -129,13 +129,13 @@ bool same_names(const std::vector<Named>& a, const std::vector<Named>& b) {
     return std::ranges::equal(a, b, {}, &Named::name, &Named::name);
 }
 
-/// Reads the map: another scene with the same bodies and sensors, of which only the shapes differ. `given`: in
-/// place of the file that the table names; empty: that one.
-std::string read_map(TableReader& table, const Scene& scene, const std::string& given) {
+/// Reads the map: another scene with the same bodies and sensors, of which only the shapes differ; of the file that
+/// `s` has already in place of the one that the table names.
+std::string read_map(TableReader& table, const Scenario& s, const Scene& scene) {
     const auto map = table.text("map");
     if (!map) return "";
-    std::string path = given.empty() ? beside(table.place("map").file, *map) : given;
-    const auto known = read_scene(path);
+    std::string path = s.navigation.scene.empty() ? beside(s.file, *map) : s.navigation.scene;
+    const auto known = read_scene(path, s.map_overrides);
     if (!known) {
         table.fail("map", known.error().text());
     } else if (!same_names(known->bodies, scene.bodies) || !same_names(known->cameras, scene.cameras) ||
@@ -158,7 +158,7 @@ void read_navigation(TableReader& root, Scenario& s, const Scene& scene) {
     if (n.cameras.empty() && n.lidars.empty() && !over_ground)
         table->fail(table->has("lidars") ? "lidars" : "cameras",
                     "no sensor, expected a camera or a LiDAR to navigate by");
-    n.scene = read_map(*table, scene, n.scene);
+    n.scene = read_map(*table, s, scene);
     table->read("map_sigma_m", n.map_sigma_m);
     table->read("map_correlation_m", n.map_correlation_m);
     table->read("period_s", n.period_s);

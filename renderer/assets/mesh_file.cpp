@@ -24,6 +24,10 @@ float from_bits(std::uint32_t b) {
     return std::bit_cast<float>(b);
 }
 
+float largest_part(const Vec3f& p) {
+    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+}
+
 /// Twice the triangle's area, as a vector along its normal.
 Vec3 area_vector(const std::array<Vec3f, 3>& p) {
     const Vec3 a = vec_cast<double>(p[0]);
@@ -55,6 +59,9 @@ public:
         out_.mesh.faces.reserve(soup.triangles.size());
         out_.mesh.face_material.reserve(soup.triangles.size());
     }
+
+    /// Largest coordinate of a triangle, either way; after `build`.
+    [[nodiscard]] float reach_m() const { return reach_m_; }
 
     MeshFile build() {
         for (const TriangleSoup::Triangle& t : soup_.triangles) sift(t);
@@ -89,6 +96,7 @@ private:
         for (std::size_t i = 0; i < 3; ++i) {
             p[i] = scaled_[t.corners[i].position];
             if (!is_finite(p[i])) return void(++out_.non_finite);
+            reach_m_ = std::max(reach_m_, largest_part(p[i]));
             std::uint32_t& known = last_[t.corners[i].position].point;
             if (known == kUnknown) known = points_.number({bits(p[i].x), bits(p[i].y), bits(p[i].z)});
             point[i] = known;
@@ -162,6 +170,7 @@ private:
     Numbering<7> vertices_;
     Numbering<3> colours_;
     std::vector<Last> last_;
+    float reach_m_ = 0;
     MeshFile out_;
 };
 
@@ -253,8 +262,14 @@ Result<MeshFile> read_mesh(const std::string& path, double scale, double crease_
         soup->warnings.push_back(path + ": smoothing groups (s) are not used; crease_angle_deg smooths edges");
     else if (crease_rad > 0)
         soup->warnings.push_back(path + ": has normals of its own, crease_angle_deg is not used");
-    MeshFile file = MeshBuilder(*soup, scale).build();
+    MeshBuilder builder(*soup, scale);
+    MeshFile file = builder.build();
     file.mesh.name = path;
+    if (builder.reach_m() > kMeshReach_m)
+        return Error{
+            .what = fmt::format("reaches to {:.3g} m, expected coordinates of at most {:g} m, scale included",
+                                builder.reach_m(), kMeshReach_m),
+            .file = path};
     if (file.mesh.faces.empty())
         return Error{.what = fmt::format("none of its {} triangles can be used: {} not finite, {} degenerate",
                                          given, file.non_finite, file.degenerate),

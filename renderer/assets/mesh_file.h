@@ -47,13 +47,16 @@ struct MeshFile {
     std::vector<std::string> warnings;
 };
 
+/// Largest coordinate of a mesh, either way, as that of the exact shapes: beyond 1.8e18 m Embree drops triangles.
+inline constexpr float kMeshReach_m = 1e15f;
+
 /// Reads OBJ + MTL (.obj, .tab), glTF, PLY, STL, 3DS and DAE; `scale` turns the file's unit into metres and is
 /// applied in double. Node transforms are applied. Faces are triangulated; points and lines are left out. Normals
 /// are kept where the file gives them. Of a file without, `crease_rad` smooths the edges between triangles that
 /// are turned against each other by less than that (smooth_normals.h); 0: none. Dropped and counted: triangles with
 /// a coordinate that is not finite, triangles whose height is below 2^-24 of their longest side (float cannot hold
 /// their normal), and second copies of a triangle, whichever way round. Errors name the mesh file, and the line
-/// where it is an OBJ.
+/// where it is an OBJ; a mesh beyond kMeshReach_m is one.
 Result<MeshFile> read_mesh(const std::string& path, double scale, double crease_rad = 0,
                            const MeshReaderLimits& limits = {});
 

@@ -10,8 +10,6 @@
 namespace narpa {
 namespace {
 
-constexpr double kBelowGround_m = 1000;
-
 /// Integrals of the Lagrange basis polynomials from 0 to each node, by the same rule scaled to that interval.
 std::vector<float> integration_matrix(const Quadrature& q) {
     const std::size_t n = q.node.size();

@@ -48,6 +48,9 @@ struct PanelEnds {
     std::size_t n = 0;  ///< points; 0: the ray misses the air
 };
 
+/// Depth below the surface at which a ray ends, so that the ground's own hits decide.
+inline constexpr double kBelowGround_m = 1000;
+
 /// Panel ends of a ray of length `range_m` (origin from the planet's centre, metres; unit direction): where it
 /// enters and leaves the air, where it is lowest, and, if `to_sun` is given, where it crosses the edge of the
 /// planet's shadow. The ray ends 1 km below the surface.

@@ -104,7 +104,8 @@ inline float disc_above(float x) noexcept {
 /// Parametrised by the distance to the top (E. Bruneton, F. Neyret, EGSR 2008).
 inline AirColumns AirTables::to_space(float radius_m, float from_horizon_m, float cosine) const noexcept {
     const float rise = (top_m - radius_m) * (top_m + radius_m), b = radius_m * cosine;
-    const float to_top = rise / (b + std::sqrt(std::max(0.0f, b * b + rise)) + 1e-3f);
+    const float root = std::sqrt(std::max(0.0f, b * b + rise));
+    const float to_top = b < 0 ? root - b : rise / (b + root + 1e-3f);  // both free of cancellation
     const float least = top_m - radius_m, most = from_horizon_m + horizon_m;
     const auto [i, fi] = axis_cell(from_horizon_m / horizon_m, column_heights);
     const auto [j, fj] = axis_cell((to_top - least) / (most - least), column_angles);

@@ -14,6 +14,7 @@ namespace narpa {
 namespace {
 
 constexpr float kSqrt4Pi = 3.5449077f;
+constexpr AirColumns kBlocked{1e12f, 1e12f, 0};  ///< of a ray that the ground stops
 
 /// Adds the irradiance of a surface, whose normal has the components nz along the zenith and nx towards the Sun.
 NARPA_EACH_ISA void add_cosine_lobe(const AirTables::Corners& c, std::size_t lanes, float nz, float nx,
@@ -113,24 +114,20 @@ AirColumns ScatteredLight::columns(const Vec3& origin, const Vec3& direction, do
 }
 
 AirColumns ScatteredLight::columns_to_space(const Vec3& origin, const Vec3& direction) const noexcept {
-    const double top = air_.top_radius_m();
-    double r = norm(origin);
-    Vec3 start = origin;
-    if (r > top) {
-        const PanelEnds ends =
-            panel_ends(air_, origin, direction, std::numeric_limits<double>::infinity(), nullptr);
-        if (ends.n < 2) return {};
-        start = origin + ends.t_m[0] * direction;
-        r = std::min(norm(start), top);
-    }
+    const double r = norm(origin);
+    if (r > air_.top_radius_m()) return columns_across(origin, direction);
     const double h = std::max(0.0, r - air_.ground_radius_m());
-    const double cosine = dot(start, direction) / r, horizon = distance_to_horizon_m(air_, h);
-    if (cosine < -horizon / r - 2e-3) {
-        constexpr float kBlocked = 1e12f;
-        return {kBlocked, kBlocked, 0};
-    }
+    const double cosine = dot(origin, direction) / r, horizon = distance_to_horizon_m(air_, h);
+    if (cosine < -horizon / r - 2e-3) return kBlocked;
     const auto mu = static_cast<float>(std::max(cosine, -horizon / r + 4e-6));
     return tables_.to_space(tables_.ground_m + static_cast<float>(h), static_cast<float>(horizon), mu);
+}
+
+AirColumns ScatteredLight::columns_across(const Vec3& origin, const Vec3& direction) const noexcept {
+    const double lowest_t = -dot(origin, direction), lowest = norm(origin + lowest_t * direction);
+    if (lowest_t <= 0 || lowest >= air_.top_radius_m()) return {};
+    if (lowest < air_.ground_radius_m() - kBelowGround_m) return kBlocked;
+    return columns_along(air_, rule_, origin, direction, std::numeric_limits<double>::infinity());
 }
 
 ScatteredLight::Spectrum ScatteredLight::scalar_irradiance(double height_m, double sun_cosine) const noexcept {

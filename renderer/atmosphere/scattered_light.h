@@ -36,7 +36,8 @@ public:
                                 const Vec3& to_sun) const noexcept;
     /// The columns alone.
     [[nodiscard]] AirColumns columns(const Vec3& origin, const Vec3& direction, double range_m) const noexcept;
-    /// To space, from the table: infinite where the ground is in the way.
+    /// To space, infinite where the ground is in the way: from the table where the ray starts in the air; from
+    /// above it, integrated along the ray.
     [[nodiscard]] AirColumns columns_to_space(const Vec3& origin, const Vec3& direction) const noexcept;
 
     /// Irradiance of a surface by light from sky and ground, unshadowed; includes direct sunlight that the aerosol
@@ -57,6 +58,8 @@ public:
 
 private:
     struct Moments;
+    /// The columns of a ray that starts above the air: the table holds those from inside.
+    [[nodiscard]] AirColumns columns_across(const Vec3& origin, const Vec3& direction) const noexcept;
     void solve(const AirResolution& resolution);
     double iterate(const AirResolution& resolution, const Moments& once);
     void gather(std::size_t height, const AirResolution& resolution, bool once, Moments& to) const;

@@ -53,12 +53,13 @@ private:
 
 }  // namespace
 
-EllipsoidShape::EllipsoidShape(const Vec3& semi_axes_m, int material, bool textured)
+EllipsoidShape::EllipsoidShape(const Vec3& semi_axes_m, int material, std::optional<MapLatitude> maps)
     : semi_axes_m_(semi_axes_m),
       radius_m_(std::max({semi_axes_m.x, semi_axes_m.y, semi_axes_m.z})),
       scale_to_sphere_{radius_m_ / semi_axes_m.x, radius_m_ / semi_axes_m.y, radius_m_ / semi_axes_m.z},
       material_(material),
-      textured_(textured) {
+      textured_(maps.has_value()),
+      map_latitude_(maps.value_or(MapLatitude::planetographic)) {
     properties_ = {.radius_m = radius_m_,
                    .bound_m = radius_m_ * (1 + 1e-5),
                    .bounds = {{}, semi_axes_m},
@@ -128,21 +129,26 @@ void EllipsoidShape::surface(const ShapeHits& found, std::uint32_t wanted, HitBa
     hits.u.fill(0), hits.v.fill(0);
     if (!textured_) return;
     for_each_lane(wanted, [&](std::size_t i) {
-        const auto [u, v] = uv(normal(hits.departure_body[i]));
+        const auto [u, v] = uv(map_direction(hits.departure_body[i]));
         hits.u[i] = static_cast<float>(u), hits.v[i] = static_cast<float>(v);
     });
 }
 
 /// At a pole dp_du is 0, and dp_dv is along the meridian of u = 0.
 TextureFrame EllipsoidShape::texture_frame(const Hit& hit) const noexcept {
-    const Vec3 n = normal(hit.departure_body);
+    const Vec3 n = map_direction(hit.departure_body);
     const double s = std::hypot(n.x, n.y), cos_longitude = s > 0 ? n.x / s : 1, sin_longitude = s > 0 ? n.y / s : 0;
     const Vec3 dn_du = 2 * std::numbers::pi * Vec3{-n.y, n.x, 0};
     const Vec3 dn_dv = -std::numbers::pi * Vec3{n.z * cos_longitude, n.z * sin_longitude, -s};
-    // The point whose normal is n: p = A n / h, A = diag(semi-axes^2), h^2 = n.A n.
-    const Vec3 a2 = semi_axes_m_ * semi_axes_m_, a2_n = a2 * n;
-    const double h = std::sqrt(dot(n, a2_n));
-    const auto dp = [&](const Vec3& dn) { return (1 / h) * (a2 * dn - (dot(a2_n, dn) / (h * h)) * a2_n); };
+    // The point whose direction on the map is n: p = M n / h, h^2 = n.S n. With A = diag(semi-axes^2), M and S are
+    // both A for planetographic directions, 1 and 1/A for planetocentric, and sqrt(A) and 1 for parametric ones.
+    const Vec3 a2 = semi_axes_m_ * semi_axes_m_, one{1, 1, 1};
+    const bool graphic = map_latitude_ == MapLatitude::planetographic,
+               centric = map_latitude_ == MapLatitude::planetocentric;
+    const Vec3 m = graphic ? a2 : centric ? one : semi_axes_m_, m_n = m * n;
+    const Vec3 s_n = graphic ? m_n : centric ? n / a2 : n;
+    const double h = std::sqrt(dot(n, s_n));
+    const auto dp = [&](const Vec3& dn) { return (1 / h) * (m * dn - (dot(s_n, dn) / (h * h)) * m_n); };
     return {dp(dn_du), dp(dn_dv)};
 }
 
@@ -157,9 +163,10 @@ Vec3 ellipsoid_axes_m(std::span<const double> values) {
     return values.size() == 1 ? Vec3{values[0], values[0], values[0]} : Vec3{values[0], values[1], values[2]};
 }
 
-std::shared_ptr<const Shape> make_ellipsoid(std::span<const double> values, int material, bool textured) {
+std::shared_ptr<const Shape> make_ellipsoid(std::span<const double> values, int material,
+                                            std::optional<MapLatitude> maps) {
     if (!std::ranges::all_of(values, [](double x) { return x > 0 && std::isfinite(x); })) return nullptr;
-    return std::make_shared<EllipsoidShape>(ellipsoid_axes_m(values), material, textured);
+    return std::make_shared<EllipsoidShape>(ellipsoid_axes_m(values), material, maps);
 }
 
 }  // namespace narpa

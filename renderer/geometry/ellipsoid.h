@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "base/constants.h"
 #include "renderer/geometry/shape_kind.h"
@@ -25,8 +26,8 @@ struct Crossing {
 
 class EllipsoidShape final : public Shape {
 public:
-    /// `material` is an index into Scene::materials; a textured one gets texture coordinates.
-    explicit EllipsoidShape(const Vec3& semi_axes_m, int material = 0, bool textured = false);
+    /// `material` is an index into Scene::materials; one with `maps` gets texture coordinates.
+    explicit EllipsoidShape(const Vec3& semi_axes_m, int material = 0, std::optional<MapLatitude> maps = {});
 
     std::uint32_t intersect(const ShapeRays& rays, std::uint32_t wanted, ShapeHits& hits) const noexcept override;
     [[nodiscard]] std::uint32_t occluded(const ShapeRays& rays, std::uint32_t wanted) const noexcept override;
@@ -64,8 +65,14 @@ public:
         return (1 / norm(q)) * q * semi_axes_m_;
     }
 
-    /// Texture coordinates of the point with the outward normal n: u is its longitude from +x towards +y, v its
-    /// geodetic latitude, 1 at +z.
+    /// The direction whose longitude and latitude are those of a point p on a map, unit.
+    [[nodiscard]] Vec3 map_direction(const Vec3& p) const noexcept {
+        if (map_latitude_ == MapLatitude::planetographic) return normal(p);
+        return normalized(map_latitude_ == MapLatitude::planetocentric ? p : p * scale_to_sphere_);
+    }
+
+    /// Texture coordinates of a point with this direction on a map: u is its longitude from +x towards +y, v its
+    /// latitude, 1 at +z.
     [[nodiscard]] static std::array<double, 2> uv(const Vec3& n) noexcept {
         const double colatitude = std::atan2(std::hypot(n.x, n.y), n.z), longitude = std::atan2(n.y, n.x);
         const double u = longitude / (2 * std::numbers::pi);
@@ -81,6 +88,7 @@ private:
     Vec3 scale_to_sphere_;  ///< scale to the sphere: radius over semi-axes
     int material_;
     bool textured_;
+    MapLatitude map_latitude_;
 };
 
 inline constexpr TableKey kSphereRows[]{{"radius_m", rows::number(kShapeLength), "a number > 0"}};
@@ -88,7 +96,7 @@ inline constexpr TableKey kEllipsoidRows[]{
     {"semi_axes_m", rows::vec3(kShapeLength), "[a, b, c], the half lengths along the body's x, y and z"}};
 /// `values`: a radius, or three semi-axes.
 [[nodiscard]] std::shared_ptr<const Shape> make_ellipsoid(std::span<const double> values, int material,
-                                                          bool textured);
+                                                          std::optional<MapLatitude> maps);
 [[nodiscard]] Vec3 ellipsoid_axes_m(std::span<const double> values);
 inline constexpr ShapeKind kSphere{.name = "sphere",
                                    .example = "{radius_m = ...}",

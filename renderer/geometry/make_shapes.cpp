@@ -20,7 +20,9 @@ Result<ShapePointer> shape_of(const Scene& scene, const std::vector<ShapePointer
     const auto& [kind, values, material] = std::get<ExactShape>(body.shape);
     const auto index = static_cast<std::size_t>(material);
     const bool has_material = material >= 0 && index < scene.materials.size();
-    ShapePointer shape = kind->make(values, material, has_material && is_textured(scene.materials[index]));
+    std::optional<MapLatitude> maps;
+    if (has_material && is_textured(scene.materials[index])) maps = scene.materials[index].map_latitude;
+    ShapePointer shape = kind->make(values, material, maps);
     if (!shape) return bad(": " + std::string(kind->expected));
     if (!has_material)
         return bad(" names material " + std::to_string(material) + " of " + std::to_string(scene.materials.size()));

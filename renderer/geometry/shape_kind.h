@@ -20,8 +20,9 @@ struct ShapeKind {
     std::string_view example;   ///< its value, for a body without a shape: "{radius_m = ...}"
     TableKeys keys{};           ///< of its table: numbers, or arrays of numbers of one length; all required
     std::string_view expected;  ///< what `values` have to be: "the radius of a sphere is ..."
-    /// Null if the values are not such a shape's. A textured material gets texture coordinates.
-    std::shared_ptr<const Shape> (*make)(std::span<const double> values, int material, bool textured) = nullptr;
+    /// Null if the values are not such a shape's. Where the material has maps, the shape gets texture coordinates.
+    std::shared_ptr<const Shape> (*make)(std::span<const double> values, int material,
+                                         std::optional<MapLatitude> maps) = nullptr;
     /// Null: it is no ellipsoid.
     Vec3 (*semi_axes_m)(std::span<const double> values) = nullptr;
 };

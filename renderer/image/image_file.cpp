@@ -12,6 +12,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -30,7 +31,16 @@ Error cannot_write(const std::string& path, const std::string& why) {
     return Error{"cannot write: " + why, path, 0, 0, forbidden ? ErrorKind::missing : ErrorKind::bad_input};
 }
 
+Status write_to_standard_output(const std::string& head, const void* data, std::size_t size) {
+    errno = 0;
+    const bool all = std::fwrite(head.data(), 1, head.size(), stdout) == head.size() &&
+                     std::fwrite(data, 1, size, stdout) == size && std::fflush(stdout) == 0;
+    if (!all) return Error{std::string("cannot be written: ") + std::strerror(errno), "standard output"};
+    return Ok{};
+}
+
 Status write_bytes(const std::string& path, const std::string& head, const void* data, std::size_t size) {
+    if (path == kStandardOutput) return write_to_standard_output(head, data, size);
     errno = 0;
     std::ofstream file(path, std::ios::binary);
     file.write(head.data(), static_cast<std::streamsize>(head.size()));
@@ -242,6 +252,7 @@ std::string extension_of(const std::string& path) {
 }  // namespace
 
 Status check_image_name(const std::string& path) {
+    if (path == kStandardOutput) return Ok{};
     const std::string extension = extension_of(path);
     for (const char* known : {".exr", ".pfm", ".png", ".raw"})
         if (extension == known) return Ok{};
@@ -250,7 +261,7 @@ Status check_image_name(const std::string& path) {
 
 Status write_image(const std::string& path, const RenderedFrame& frame) {
     if (auto good = check_image_name(path); !good) return good;
-    const std::string extension = extension_of(path);
+    const std::string extension = path == kStandardOutput ? ".png" : extension_of(path);
     if (extension == ".exr") return write_exr(path, frame);
     if (extension == ".pfm")
         return write_pfm(path, "PF", frame.radiance.width, frame.radiance.height, frame.radiance.pixels);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -24,6 +25,9 @@ struct RenderedFrame {
     std::span<const std::uint8_t> bytes{};  ///< what `expose` wrote: needed by .png and .raw
 };
 
+/// In place of a path: a PNG on standard output.
+inline constexpr std::string_view kStandardOutput = "-";
+
 /// Error: `path` has an extension that write_image does not know.
 Status check_image_name(const std::string& path);
 
@@ -37,6 +41,7 @@ Status check_image_name(const std::string& path);
 ///   .png  the camera's own output: GREY 8-bit, Y16 16-bit grey, RGB24 and YUYV 8-bit colour, Bayer mosaics
 ///         as they are, 8-bit or 16-bit grey
 ///   .raw  the camera's own output, byte for byte as written to a video device
+///   kStandardOutput  as .png
 /// Errors: an unknown extension; a path that cannot be written.
 Status write_image(const std::string& path, const RenderedFrame& frame);
 

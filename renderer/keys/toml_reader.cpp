@@ -37,8 +37,19 @@ std::optional<double> as_number(const toml::node& node) {
     return std::nullopt;
 }
 
+/// An integer in the base of the one in the file.
+std::string in_base_of(const toml::value<std::int64_t>& typed, std::int64_t i) {
+    using Flags = toml::value_flags;
+    const auto has = [&](Flags base) { return (typed.flags() & base) == base; };
+    if (i < 0) return fmt::format("{}", i);
+    if (has(Flags::format_as_hexadecimal)) return fmt::format("0x{:x}", i);
+    if (has(Flags::format_as_octal)) return fmt::format("0o{:o}", i);
+    if (has(Flags::format_as_binary)) return fmt::format("0b{:b}", i);
+    return fmt::format("{}", i);
+}
+
 std::string shown(const toml::node& node) {
-    if (const auto* i = node.as_integer()) return fmt::format("{}", i->get());
+    if (const auto* i = node.as_integer()) return in_base_of(*i, i->get());
     if (const auto* f = node.as_floating_point()) return fmt::format("{}", f->get());
     return std::string(type_words(node));
 }
@@ -201,7 +212,10 @@ std::optional<std::int64_t> TableReader::integer(std::string_view key, std::int6
         const auto* i = node.as_integer();
         return i && i->get() >= low && i->get() <= high ? std::optional(i->get()) : std::nullopt;
     };
-    return value(key, take, fmt::format("an integer in [{}, {}]", low, high));
+    const toml::node* const node = find(key);
+    const auto* const typed = node ? node->as_integer() : nullptr;
+    const auto words = [&](std::int64_t i) { return typed ? in_base_of(*typed, i) : fmt::format("{}", i); };
+    return value(key, take, fmt::format("an integer in [{}, {}]", words(low), words(high)));
 }
 
 std::optional<bool> TableReader::boolean(std::string_view key) {

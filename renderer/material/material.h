@@ -1,8 +1,10 @@
 /// renderer/material/material.h - how a surface scatters light, as plain data: materials and their textures.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/vec3.h"
@@ -31,6 +33,16 @@ struct Hapke {
     float opposition_b0 = 0, opposition_h = 0.05f;  ///< shadow hiding: amplitude, width
     float roughness_rad = 0;                        ///< macroscopic mean slope, theta-bar
 };
+
+/// What the rows of a globe's maps are latitudes of, and their columns longitudes of, on an ellipsoid (P. K.
+/// Seidelmann et al., Celest. Mech. Dyn. Astron. 98, 2007).
+enum class MapLatitude : std::uint8_t {
+    planetographic,  ///< the outward normal
+    planetocentric,  ///< the line from the centre
+    parametric,      ///< that line after scaling the axes so that the ellipsoid is a sphere
+};
+inline constexpr std::array<std::string_view, 3> kMapLatitudeNames{"planetographic", "planetocentric",
+                                                                   "parametric"};
 
 /// A row of the table of kinds: bsdf_kind.h.
 struct BsdfKind;
@@ -70,6 +82,7 @@ struct Material {
     Rgb cloud_albedo{};
     int normal_texture = -1;  ///< tangent space: 2 rgb - 1 = (along u, along v, out), times (scale, scale, 1)
     int height_texture = -1;  ///< bumps: height in metres = bump_height_m * mean of rgb
+    MapLatitude map_latitude = MapLatitude::planetographic;  ///< of all these on an ellipsoid
     float normal_scale = 1;
     float bump_height_m = 0;
     int vertex_colours = -1;     ///< 0: Mesh::colours multiply `diffuse`; -1 is none

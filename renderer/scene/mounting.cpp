@@ -38,7 +38,7 @@ void read_look_at(TableReader& table, Rigid3& T, AttitudeOf attitude_of) {
     if (table.has("attitude_wxyz")) table.fail("look_at", "there is an attitude_wxyz too, expected one of the two");
     if (!target) return;
     const Vec3 line = *target - T.t;
-    if (!(norm(line) > 1e-9) || !is_finite(line))
+    if (line == Vec3{} || !is_finite(line))
         return table.fail("look_at", "is the place that it looks from, expected another point");
     const Vec3 forward = normalized(scaled_to_one(line)), above = scaled_to_one(up), right = cross(forward, above);
     if (!(norm(right) > 1e-6 * norm(above)))

@@ -159,7 +159,8 @@ struct RenderSettings {
 
 struct Scene {
     std::string name, file;
-    std::int64_t epoch_unix_ns = 0;  ///< UTC of simulation time 0
+    std::vector<std::string> overrides{};  ///< KEY=VALUE of `--set`, in place of the file's
+    std::int64_t epoch_unix_ns = 0;        ///< UTC of simulation time 0
     std::optional<Sun> sun;
     std::optional<StarField> stars{};
     Rgb ambient{};  ///< radiance arriving from everywhere, W m^-2 sr^-1 a band

@@ -241,7 +241,7 @@ void read_head(TableReader& head, LidarPattern& p) {
 Result<LidarMake> read_description(const std::string& file) {
     Problems problems(file);
     auto pattern = std::make_shared<LidarPattern>();
-    const auto parsed = TomlFile::read(file, "lidar");
+    const auto parsed = TomlFile::read(file, "lidar", kLidarDescriptionKeys);
     if (!parsed) return parsed.error();
     TableReader root = parsed->root("the description", problems, &kLidarDescriptionKeys);
     if (auto head = root.table("lidar")) {

@@ -10,6 +10,7 @@
 
 #include "renderer/assets/mesh_file.h"
 #include "renderer/assets/texture_file.h"
+#include "renderer/keys/shipped_file.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -20,6 +21,21 @@ std::string canonical(const std::string& path) {
     std::error_code problem;
     const auto full = std::filesystem::weakly_canonical(path, problem);
     return problem ? path : full.string();
+}
+
+/// A mesh that a scene of a clone names and that narpa's build makes: where it is. Empty: it is none.
+std::string made_at_build(const std::string& missing) {
+    namespace fs = std::filesystem;
+    std::error_code problem;
+    const fs::path shipped = shipped_folder(), path = fs::path(canonical(missing));
+    if (shipped.empty() || fs::exists(path, problem)) return {};
+    fs::path tail;
+    for (auto part = path.end(); part != path.begin() && *std::prev(part) != "scenes";)
+        tail = tail.empty() ? *--part : *--part / tail;
+    const fs::path made = shipped / tail;
+    if (!fs::is_regular_file(made, problem)) return {};
+    return fmt::format(": it is made when narpa is built; expected the scene in {}, which `narpa list` names",
+                       shipped.string());
 }
 
 /// Opens each file once, however many bodies and materials name it.
@@ -57,6 +73,7 @@ private:
 
     /// Reports an error at its line of the mesh file, if known, else at the scene's line.
     void blame(const NamedMesh& named, Error error) {
+        error.what += made_at_build(named.path);
         if (error.line == 0) return r_.problems.add(named.place, "mesh: " + error.text());
         error.what += fmt::format(" (mesh of body \"{}\", {}:{})", r_.scene.bodies[named.body].name,
                                   r_.problems.file(), named.place.line);

@@ -21,6 +21,7 @@ constexpr TableKey kMaterialRows[]{
     {"normal_scale", rows::number({.low = 0, .high = 100})},
     {"height_texture", kDataTexture},
     {"bump_height_m", rows::number({.low = -1e6, .high = 1e6})},
+    {"map_latitude", rows::choice<kMapLatitudeNames>()},
 };
 
 /// Records a problem where the surface would reflect more than it receives.
@@ -91,13 +92,27 @@ void read_textures(TableReader& table, Material& m, SceneReading& reading) {
     if (table.has("height_texture")) table.require("bump_height_m", "a number: how high white stands above black");
 }
 
+/// `map_latitude`, after the textures that it is for.
+void read_map_latitude(TableReader& table, bool on_globe, Material& m) {
+    bool has_map = false;
+    for (const char* key :
+         {"texture", "emission_texture", "specular_texture", "cloud_texture", "normal_texture", "height_texture"})
+        has_map |= table.has(key);
+    if (!on_globe)
+        table.refuse("map_latitude", "belongs to a sphere or an ellipsoid");
+    else if (!has_map)
+        table.refuse("map_latitude", "belongs to a texture, which is not here");
+    table.read("map_latitude", m.map_latitude);
+}
+
 /// Reads everything but the kind.
-void read_parameters(TableReader& table, Material& m, SceneReading& reading) {
+void read_parameters(TableReader& table, bool on_globe, Material& m, SceneReading& reading) {
     m.kind->read(table, m);
     if (reading.problems.none()) check_energy(table, m);
     table.read("retroreflectance", m.retroreflectance);
     table.read("emission", m.emission);
     read_textures(table, m, reading);
+    read_map_latitude(table, on_globe, m);
     if (m.kind->direct_only && reading.scene.render.method == RenderSettings::Method::path)
         table.fail("kind",
                    fmt::format("\"{}\" keeps no energy, expected \"phong\" where method = \"path\"", m.kind->name));
@@ -115,7 +130,7 @@ std::optional<int> read_material(TableReader& body, const std::string& name, Sce
     m.name = name;
     if (const auto kind = table->kind()) {
         m.kind = bsdf_kinds()[*kind];
-        read_parameters(*table, m, reading);
+        read_parameters(*table, body.has("sphere") || body.has("ellipsoid"), m, reading);
     }
     reading.scene.materials.push_back(std::move(m));
     return static_cast<int>(reading.scene.materials.size()) - 1;

@@ -10,7 +10,8 @@ namespace narpa {
 
 namespace {
 
-constexpr TableKey kSceneRows[]{{"name", rows::text()}, {"based_on", rows::file()}, {"epoch", rows::date()}};
+constexpr TableKey kSceneRows[]{
+    {"name", rows::text()}, {"based_on", rows::file()}, {"replaces", rows::texts()}, {"epoch", rows::date()}};
 constexpr TableKey kSunRows[]{
     {"irradiance_w_m2", rows::number(kPositive)},
     {"angular_diameter_deg", rows::number({.low = 0, .high = 180, .high_open = true})},

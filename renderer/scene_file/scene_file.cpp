@@ -5,8 +5,10 @@
 #include <algorithm>
 
 #include "renderer/keys/toml_file.h"
+#include "renderer/keys/toml_override.h"
 #include "renderer/light/sky_kind.h"
 #include "renderer/material/bsdf_kind.h"
+#include "renderer/scene_file/doubtful_units.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -48,20 +50,23 @@ void warn_of_dark_materials(Scene& scene) {
     if (scene.render.method == RenderSettings::Method::direct) scene.warnings.push_back(warning);
 }
 
-Result<Scene> read_files(const std::string& path) {
+Result<Scene> read_files(const std::string& path, std::span<const std::string> overrides) {
     SceneReading reading{
         .scene = {}, .problems = Problems(path), .folder = std::filesystem::path(path).parent_path()};
     reading.scene.file = path;
-    const auto file = TomlFile::read(path, "scene");
+    reading.scene.overrides.assign(overrides.begin(), overrides.end());
+    const auto file = TomlFile::read(path, "scene", kSceneFileKeys, overrides);
     if (!file) {
         Error error = file.error();
-        if (error.line > 0 && !path.ends_with(".toml")) error.what += ", expected a scene file (TOML)";
+        if (error.line > 0 && error.file == path && !path.ends_with(".toml"))
+            error.what += ", expected a scene file (TOML)";
         return error;
     }
     TableReader root = file->root("the scene", reading.problems, &kSceneFileKeys);
     read_root(root, reading);
-    if (!reading.problems.none()) return reading.problems.first();
+    if (!reading.problems.none()) return at_option(reading.problems.first());
     warn_of_dark_materials(reading.scene);
+    for (std::string& text : doubtful_units(reading.scene)) reading.scene.warnings.push_back(std::move(text));
     return std::move(reading.scene);
 }
 
@@ -81,9 +86,9 @@ Status use_method(Scene& scene, RenderSettings::Method method) {
     return Ok{};
 }
 
-Result<Scene> read_scene(const std::string& path) {
+Result<Scene> read_scene(const std::string& path, std::span<const std::string> overrides) {
     try {
-        return read_files(path);
+        return read_files(path, overrides);
     } catch (const std::exception& e) {
         return Error{.what = fmt::format("cannot be read: {}", e.what()), .file = path};
     }

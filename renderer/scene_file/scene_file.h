@@ -1,6 +1,7 @@
 /// renderer/scene_file/scene_file.h - scene file (TOML) and its meshes and textures -> Scene.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "base/result.h"
@@ -12,9 +13,10 @@ namespace narpa {
 /// The tables of a scene file.
 extern const TableKeys kSceneFileKeys;
 
-/// Reads a scene and everything it names; paths inside are relative to the scene file. The key reference is
-/// docs/scene.md. Errors carry file, line and column; a key that is not known is an error.
-Result<Scene> read_scene(const std::string& path);
+/// Reads a scene and everything it names; paths inside are relative to the file that they stand in. The key
+/// reference is docs/scene.md. Errors carry file, line and column; a key that is not known is an error.
+/// `overrides`: values of single keys, KEY=VALUE (renderer/keys/toml_override.h); the scene remembers them.
+Result<Scene> read_scene(const std::string& path, std::span<const std::string> overrides = {});
 
 /// Changes the method of a scene that has been read, and updates its warnings; an error where a material does not
 /// allow the method.

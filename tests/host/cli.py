@@ -2,6 +2,7 @@
 """The command line for scripts: --help, one JSON document on standard output, exit codes, errors with file and line."""
 import contextlib
 import json
+import math
 import os
 import re
 import socketserver
@@ -14,10 +15,11 @@ import support
 from support import expect, narpa
 
 SUBCOMMANDS = {
-    "check": ["SCENE"],
+    "check": ["SCENE", "--set", "--strict"],
     "run": ["--can", "--video", "--lidar", "--lockstep", "--duration", "--log", "--spp", "--budget-ms", "--budget-rays"],
     "fly": ["--can", "--lockstep"],
-    "render": ["--camera", "--time", "--frame", "--trajectory", "--pose", "--format", "-o"],
+    "render": ["--camera", "--time", "--frame", "--trajectory", "--pose", "--format", "-o", "--set", "--strict", "--every"],
+    "rehearse": ["SCENARIO", "--set", "--strict"],
     "map": ["--camera", "--of", "--body", "--interval", "--datum", "--up", "--time", "--pose", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
     "estimate": ["--frame", "--sweep", "--no-truth", "--uncertainty", "--frame-noise", "--method", "--start"],
@@ -232,6 +234,91 @@ def check_exposure():
     expect(re.search(r"are saturated .*; expected white_radiance of about ", said), "without a detector it is white_radiance")
 
 
+PLATE = """sun.direction = [-1.0, 0.3, 0.2]
+[[body]]
+name = "target"
+mesh = "plate.obj"
+scale = %s
+[[camera]]
+name = "eye"
+position_m = [-4.0, 0.0, 0.0]
+look_at = [0.0, 0.0, 0.0]
+resolution = [64, 48]
+fov_horizontal_deg = 20.0
+[[camera]]
+name = "side"
+position_m = [-4.0, 0.5, 0.0]
+look_at = [0.0, 0.0, 0.0]
+resolution = [64, 48]
+fov_horizontal_deg = 20.0
+"""
+# A closed box of 0.2 x 0.2 x 0.2 units.
+BOX = "".join(f"v {x} {y} {z}\n" for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)) + \
+    "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+
+
+def check_sizes():
+    """check states how large and how far bodies are for each camera, and doubts a mesh in millimetres or kilometres."""
+    scene = folder / "size.toml"
+    (folder / "plate.obj").write_text(BOX)
+    focal = 32 / math.tan(math.radians(10))
+    for scale, doubt in (("1.0", None), ("0.001", "is its mesh in another unit"), ("1000.0", "camera eye is inside body target, which is 200 m across")):
+        scene.write_text(PLATE % scale)
+        done = narpa("check", scene, "--json")
+        said, body = done.stderr.decode(), json.loads(done.stdout)["scene"]["bodies"][0]
+        size = 0.2 * float(scale)
+        expect(all(abs(x - size) < 1e-6 * size for x in body["size_m"]), f"the size of {scale}: {body['size_m']}")
+        view = body["views"][0]
+        expect(view["camera"] == "eye" and abs(view["distance_m"] - 4) < 1e-6, f"4 m away: {view}")
+        if scale != "1000.0":
+            px = 2 * math.asin(size * math.sqrt(3) / 2 / 4) * focal
+            expect(abs(view["size_px"] - px) < 1e-3 * px, f"and {px:.3g} px: {view}")
+        expect(view["camera_inside"] == (scale == "1000.0"), f"inside: {view}")
+        expect(f"body target: {size:.3g} m across; camera eye: 4 m away" in said, f"in words: {said}")
+        expect(("another unit" in said or "inside body" in said) == (doubt is not None) and (doubt or "") in said, f"doubted: {doubt}")
+        expect("expected white_radiance" not in said, f"no exposure is advised where the size is at fault: {said}")
+    narpa("check", scene, "--strict", status=1)
+
+
+def check_settings():
+    """--set replaces keys, in `render` one after the other; a series of frames needs one process; --strict fails on warnings."""
+    scene, flight = folder / "set.toml", folder / "set.csv"
+    scene.write_text(PLATE % "1.0")
+    narpa("render", scene, "-o", folder / "set.png")
+    plain = (folder / "set.png").read_bytes()
+    done = subprocess.run([support.NARPA, "render", str(scene), "-o", "-"], capture_output=True, timeout=600)
+    expect(done.stdout == plain and done.returncode == 0, "-o - writes the same PNG to standard output")
+    narpa("render", scene, "--set", "camera.eye.white_radiance=433", "-o", folder / "one.png")
+    narpa("render", scene, "--set", "camera.eye.white_radiance=433,200", "--set", "camera.eye.fov_horizontal_deg=20,10", "-o", folder / "n_%02d.png")
+    series = [(folder / f"n_0{k}.png").read_bytes() for k in range(4)]
+    expect(series[0] == (folder / "one.png").read_bytes() and len(set(series)) == 4 and not (folder / "n_04.png").exists(), "a sweep has each pair of values")
+    expect_refusal(2, r"n\.png: a series of images needs a number in the name", "render", scene, "--set", "camera.eye.white_radiance=4,5", "-o", folder / "n.png")
+    expect_refusal(2, r'--set camera\.eye\.fov_horizontal=3: unknown key "fov_horizontal" in \[\[camera\]\]; did you mean "fov_horizontal_deg"', "check", scene, "--set", "camera.eye.fov_horizontal=3")
+    expect_refusal(2, "2 values, expected one", "check", scene, "--set", "camera.eye.white_radiance=4,5")
+    header = "t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
+    flight.write_text(header + "".join(f"{0.1 * k:.1f},target,0,{0.02 * k:.2f},0,1,0,0,0,0,0.2,0,0,0,0\n" for k in range(6)))
+    done = narpa("render", scene, "--trajectory", flight, "--every", "0.2", "-o", folder / "fly/f_%05d.png", "--json")
+    frames = json.loads(done.stdout)["frames"]
+    expect([round(f["t_ns"] * 1e-9, 3) for f in frames] == [0, 0.2, 0.4] and [f["frame"] for f in frames] == [0, 2, 4], f"frames of a trajectory: {frames}")
+    for k in range(3):
+        narpa("render", scene, "--trajectory", flight, "--time", f"{0.2 * k}", "-o", folder / "alone.png")
+        expect((folder / f"fly/f_0000{k}.png").read_bytes() == (folder / "alone.png").read_bytes(), f"frame {k} is that of a process of its own")
+    expect_refusal(2, "--every steps through a trajectory", "render", scene, "--every", "1", "-o", folder / "f_%d.png")
+    log = folder / "set-log"
+    narpa("run", scene, "--set", "camera.eye.white_radiance=300", "--video", "eye=none", "--video", "side=none", "--duration", "0.3", "--log", log)
+    expect(json.loads((log / "run.json").read_text())["set"] == ["camera.eye.white_radiance=300"], "a log keeps the options")
+    narpa("replay", log)
+    narpa("render", scene, "--strict", "-o", folder / "strict.png")
+    scene.write_text((PLATE % "1.0") + "[camera.detector]\npixel_pitch_m = 5.5\n")
+    (folder / "strict.png").unlink()
+    said = narpa("check", scene).stderr.decode()
+    expect("warning: camera side: pixel_pitch_m = 5.5 is unusual" in said and "micrometres, write 5.5e-06" in said, f"units are doubted: {said}")
+    for command in (["check"], ["render", "-o", folder / "strict.png"], ["map", "-o", folder / "strict.pfm"]):
+        error = narpa(command[0], scene, *command[1:], "--strict", status=1).stderr.decode()
+        expect(re.search(r"warnings?, expected none with --strict", error), f"{command[0]} --strict: {error[-200:]}")
+    expect(not (folder / "strict.png").exists(), "and nothing is rendered")
+
+
 def check_silence():
     """Long commands report their progress and what they wait for."""
     flight = folder / "alone.csv"
@@ -366,5 +453,5 @@ def check_folders():
         run.stop()
 
 
-for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_silence, check_unix_times, check_modes, check_gone, check_replay, check_devices, check_folders):
+for check in (check_help, check_json, check_exit_codes, check_names, check_words, check_errors, check_numbers, check_output, check_sensors, check_exposure, check_sizes, check_settings, check_silence, check_unix_times, check_modes, check_gone, check_replay, check_devices, check_folders):
     check()

@@ -6,6 +6,7 @@ import importlib.util
 import json
 import math
 import re
+import resource
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -111,6 +112,34 @@ def check_pictures():
     expect(cv2.imread(str(folder / "ball.png")).shape[0] > 400, "and the PNG is a picture")
 
 
+def check_a_body_out_of_view():
+    """A mask of a body that is not in the view is empty, which is no error."""
+    scene, away = folder / "ball.toml", ("--body", "ball", "--pose", "ball=0,-99,0,1,0,0,0")
+    for name in ("away.pfm", "away.json") + (("away.png",) if DRAWS else ()):
+        done = narpa("map", scene, *away, "--interval", "1", "-o", folder / name, "--json") if name != "away.pfm" else \
+            narpa("map", scene, *away, "-o", folder / name, "--json")
+        expect("warning: the map is empty: camera eye sees no surface of body ball" in done.stderr.decode(), f"{name} has a warning")
+        summary = json.loads(done.stdout)
+        expect(summary["pixels"] == 0 and summary["lowest_m"] is None and summary["lines"] == 0, f"and no extremes: {summary}")
+    values = cv2.imread(str(folder / "away.pfm"), cv2.IMREAD_UNCHANGED)
+    expect(values.shape == (151, 201) and np.isnan(values).all(), "the file has NaN in each pixel")
+    error = narpa("map", scene, *away, "--strict", "-o", folder / "away.pfm", status=1).stderr.decode()
+    expect("1 warning, expected none with --strict" in error, f"--strict makes it an error: {error}")
+
+
+def check_no_air_is_computed():
+    """A map needs surfaces alone: an atmosphere costs no processor time. Its tables would take more than ten times as much."""
+    def seconds(text):
+        scene = folder / "earth.toml"
+        scene.write_text(text)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        mapped(scene, "-o", folder / "earth.pfm")
+        return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    earth = BALL.replace("2.0", "6371000.0").replace("[0.0, 0.0, 3.0]\n[[camera]]", "[0.0, 6371090.0, 3.0]\n[[camera]]")
+    without = seconds(earth)
+    expect(seconds('atmosphere = {body = "ball", steps = 32, samples_per_band = 8}\n' + earth) < 1 + 3 * without, f"{without:.2f} s without")
+
+
 def expect_refusal(pattern, *arguments):
     error = narpa("map", *arguments, status=2).stderr.decode()
     expect(re.search(pattern, error), f"refused with /{pattern}/: {error.strip()}")
@@ -130,5 +159,5 @@ def check_refusals():
     expect("warning: no contour line: depth reaches from 8" in said, f"an interval too wide is told: {said}")
 
 
-for check in (check_depth_of_the_descent, check_heights_of_the_descent, check_terrain_against_its_elevation_model, check_pictures, check_refusals):
+for check in (check_depth_of_the_descent, check_heights_of_the_descent, check_terrain_against_its_elevation_model, check_pictures, check_a_body_out_of_view, check_no_air_is_computed, check_refusals):
     check()

@@ -121,6 +121,7 @@ def flies():
     (folder / "scene.toml").write_text(f"""
 [scene]
 based_on = "{SCENARIOS}/flyaround-scene.toml"
+replaces = ["body"]
 
 [[body]]
 name = "asteroid"

@@ -1,5 +1,6 @@
 // Scenario files, and what follows from them.
 #include "rehearsal/scenario/scenario.h"
+#include "rehearsal/runner/run_folder.h"
 
 #include <gtest/gtest.h>
 
@@ -92,6 +93,42 @@ TEST(Scenario, InheritsMissingKeys) {
     EXPECT_EQ(s->control.damping, 0.7);
     EXPECT_EQ(s->control.bandwidth_rad_s, 0.15);
     EXPECT_EQ(s->legs.size(), 3u);
+}
+
+TEST(Scenario, OverridesReplaceItsKeysAndThoseOfItsScene) {
+    const std::vector<std::string> sets{"scenario.seed=9", "camera.nav.detector.exposure_s=1e-4",
+                                        "control.damping=0.6"};
+    const auto s = read_scenario(kScenarios + "docking.toml", sets);
+    ASSERT_TRUE(s) << s.error().text();
+    EXPECT_EQ(s->seed, 9u);
+    EXPECT_EQ(s->control.damping, 0.6);
+    EXPECT_EQ(s->scene_overrides, std::vector{sets[1]});
+    const auto texts = scenario_texts(*s), plain = scenario_texts(*read_scenario(kScenarios + "docking.toml"));
+    ASSERT_TRUE(texts);
+    EXPECT_NE(texts->scene.find("exposure_s = 0.0001"), std::string::npos) << "the run's folder has what was flown";
+    EXPECT_NE(texts->hash, plain->hash);
+    for (const std::string set : {"camera.nav.detector.exposre_s=1", "control.dampng=1", "gatse.contact=1"}) {
+        const auto bad = read_scenario(kScenarios + "docking.toml", std::vector{set});
+        ASSERT_FALSE(bad) << set;
+        EXPECT_NE(bad.error().text().find("--set " + set + ": unknown key"), std::string::npos)
+            << bad.error().text();
+        EXPECT_NE(bad.error().text().find("did you mean"), std::string::npos) << bad.error().text();
+    }
+}
+
+TEST(Scenario, MayBeBasedOnAShippedOneByItsName) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder / "mine.toml") << "[scenario]\nbased_on = \"dispersions\"\nname = \"mine\"\nseed = 5\n";
+    const auto s = read_scenario(folder / "mine.toml");
+    ASSERT_TRUE(s) << s.error().text();
+    EXPECT_EQ(s->seed, 5u);
+    EXPECT_EQ(s->legs.size(), 2u) << "the legs of a scenario replace those below as a whole";
+    std::ofstream(folder / "wrong.toml") << "[scenario]\nname = \"wrong\"\nbased_on = \"dispersion\"\n";
+    const auto wrong = read_scenario(folder / "wrong.toml");
+    ASSERT_FALSE(wrong);
+    EXPECT_EQ(wrong.error().file, folder / "wrong.toml");
+    EXPECT_EQ(wrong.error().line, 3);
+    EXPECT_NE(wrong.error().what.find("did you mean \"dispersions\""), std::string::npos) << wrong.error().what;
 }
 
 TEST(Scenario, ErrorsNameTheFileThatHasThem) {

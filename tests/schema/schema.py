@@ -49,16 +49,28 @@ def plain(value):
 def merged(path, head):
     """The file, with what it takes from the file that it is based on."""
     own = plain(tomllib.loads(path.read_text()))
+    whole_lists = {"leg", *own.get(head, {}).get("replaces", [])}
 
-    def fill(over, under):
+    def is_named(value):
+        return isinstance(value, list) and value and all(isinstance(one, dict) and "name" in one for one in value)
+
+    def fill(over, under, whole_lists=()):
         for key, value in under.items():
-            if isinstance(value, dict) and isinstance(over.get(key), dict):
-                fill(over[key], value)
+            mine = over.get(key)
+            if isinstance(value, dict) and isinstance(mine, dict):
+                fill(mine, value)
+            elif key not in whole_lists and is_named(value) and is_named(mine):
+                by_name = {one["name"]: one for one in mine}
+                for one in value:
+                    fill(by_name.setdefault(one["name"], {}), one)
+                over[key] = list(by_name.values())
             else:
                 over.setdefault(key, value)
 
     if base := own.get(head, {}).get("based_on"):
-        fill(own, merged(path.parent / base, head))
+        under = merged(path.parent / base, head)
+        under.get(head, {}).pop("replaces", None)
+        fill(own, under, whole_lists)
     return own
 
 

@@ -20,7 +20,9 @@ def surface_map(document):
     axes = drawn.subplots()
     near_is_bright = document["of"] in ("depth", "range")
     hues = ListedColormap(colormaps["viridis"](np.linspace(0.25, 1, 256)))  # without the dark end, where black lines would not be visible
-    colours = ScalarMappable(Normalize(document["lowest_m"], document["highest_m"]), hues.reversed() if near_is_bright else hues)
+    is_empty = document["lowest_m"] is None
+    limits = (0, 1) if is_empty else (document["lowest_m"], document["highest_m"])
+    colours = ScalarMappable(Normalize(*limits), hues.reversed() if near_is_bright else hues)
     light = 0.5 + 0.5 * image(document["shade"])[..., None] / 255
     rgb = np.where(np.isfinite(values)[..., None], colours.to_rgba(values)[..., :3] * light, 0.1)
     axes.imshow(rgb, interpolation="nearest")

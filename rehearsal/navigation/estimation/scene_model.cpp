@@ -29,7 +29,9 @@ void apply_model_error(const ModelUncertainty& e, std::size_t target, Scene& sce
 }  // namespace
 
 Result<std::unique_ptr<SceneModel>> SceneModel::create(const Scenario& scenario) {
-    auto scene = read_scene(scenario.navigation.scene.empty() ? scenario.scene : scenario.navigation.scene);
+    const std::string& map = scenario.navigation.scene;
+    auto scene = map.empty() ? read_scene(scenario.scene, scenario.scene_overrides)
+                             : read_scene(map, scenario.map_overrides);
     if (!scene) return scene.error();
     std::unique_ptr<SceneModel> m(new SceneModel);
     m->scene_ = *std::move(scene);

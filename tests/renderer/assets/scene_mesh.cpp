@@ -45,6 +45,8 @@ const BadFile kBadMeshes[] = {
     {"NoVertexIndex", CORNERS "f 1 /2 3\n", 4, 5, "has no vertex index"},
     {"FaceOfTwo", CORNERS "f 1 2\n", 4, 1, "a face of 2 corners, expected at least 3"},
     {"PlaceAfterAContinuedLine", "v 0 0 \\\n0\nv 1 0 0\nv 0 1 0\nf 1 2 \\\n 9\n", 6, 2, "index 9 is out of range"},
+    {"TooFar", "v 0 0 0\nv 1e21 0 0\nv 0 1e21 0\nf 1 2 3\n", 0, 0,
+     "reaches to 1e+21 m, expected coordinates of at most 1e+15 m"},
     {"NothingLeft", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", 0, 0, "none of its 1 triangles can be used"},
 };
 

@@ -77,7 +77,7 @@ const ShapeKind kTiltedSquare{
     .name = "tilted_square",
     .example = "{tilt_rad = ..., half_m = ...}",
     .expected = "a tilted square has a positive length",
-    .make = [](std::span<const double> values, int, bool) -> std::shared_ptr<const Shape> {
+    .make = [](std::span<const double> values, int, std::optional<MapLatitude>) -> std::shared_ptr<const Shape> {
         const double tilt_rad = values[0], half_m = values[1];
         if (!(half_m > 0)) return nullptr;
         return std::make_shared<TiltedSquare>(Vec3{1, 0, 0}, Vec3{0, std::cos(tilt_rad), std::sin(tilt_rad)},

@@ -199,6 +199,19 @@ TEST(SceneFile, LookAtPutsTheTargetAheadAndUpUpward) {
     expect_close(T.q * Vec3{1, 0, 0}, {0, -1, 0}, 1e-15);           // x is right: looking along +x, right is -y
 }
 
+TEST(SceneFile, LookAtWorksInScenesOfEverySize) {
+    const auto attitude = [](const char* eye, const char* point) {
+        const Scene s = read_good_text(std::string("[ambient]\nradiance = 1\n") + kSphere + kCamera +
+                                       "position_m = " + eye + "\nlook_at = " + point + "\n");
+        return s.cameras.at(0).T_mount_camera.q.vec();
+    };
+    const Vec3 metres = attitude("[1, 2, 3]", "[-4, 5, 2]");
+    for (const auto& [eye, point] : {std::pair{"[1e-12, 2e-12, 3e-12]", "[-4e-12, 5e-12, 2e-12]"},
+                                     {"[1e-200, 2e-200, 3e-200]", "[-4e-200, 5e-200, 2e-200]"},
+                                     {"[1e20, 2e20, 3e20]", "[-4e20, 5e20, 2e20]"}})
+        expect_close(attitude(eye, point), metres, 1e-14);
+}
+
 TEST(SceneFile, DirectionsMayHaveAnyLength) {
     const auto read = [](const char* sun, const char* up) {
         return read_good_text(std::string("[sun]\ndirection = ") + sun + "\n" + kSphere + kCamera +

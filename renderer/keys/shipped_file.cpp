@@ -1,29 +1,19 @@
-// narpa list, and the files that it names.
-#include "apps/shipped.h"
+#include "renderer/keys/shipped_file.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <string_view>
 
-#include "apps/cli.h"
 #include "base/nearest_name.h"
 #include "base/program_beside.h"
 
-namespace narpa::cli {
+namespace narpa {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Empty: there is none.
-fs::path shipped_folder() {
-    std::error_code error;
-    const fs::path program = program_folder();
-    for (const char* folder : {"../scenes", "../share/narpa/scenes"})
-        if (fs::path path = (program / folder).lexically_normal(); fs::is_directory(path, error)) return path;
-    return {};
-}
 
 /// The first sentence of the comment at its top, or its title.
 std::string about(const fs::path& file) {
@@ -47,9 +37,15 @@ std::string short_name(const fs::path& relative, FileKind kind) {
     return folder == stem || (kind == FileKind::scenario && folder == "rehearsal") ? stem : folder + "/" + stem;
 }
 
-constexpr const char* kKindWords[] = {"scene", "scenario"};
-
 }  // namespace
+
+fs::path shipped_folder() {
+    std::error_code error;
+    const fs::path program = program_folder();
+    for (const char* folder : {"../scenes", "../share/narpa/scenes"})
+        if (fs::path path = (program / folder).lexically_normal(); fs::is_directory(path, error)) return path;
+    return {};
+}
 
 std::vector<ShippedFile> shipped_files(FileKind kind) {
     std::vector<ShippedFile> all;
@@ -95,58 +91,39 @@ Error other_kind(FileKind expected, const std::string& given) {
 }  // namespace
 
 Result<std::string> find_file(FileKind kind, const std::string& file_or_name) {
-    const std::string expected = kKindWords[static_cast<std::size_t>(kind)];
     std::error_code error;
     if (fs::exists(file_or_name, error) && !fs::is_directory(file_or_name, error)) {
         const auto found = fs::is_regular_file(file_or_name, error) ? kind_of(file_or_name) : std::nullopt;
         if (found && *found != kind) return other_kind(kind, file_or_name);
         return file_or_name;
     }
+    return find_shipped(kind, file_or_name);
+}
+
+std::string own_or_shipped(const std::string& file) {
+    std::error_code error;
+    const fs::path folder = shipped_folder();
+    if (file.empty() || folder.empty() || fs::exists(file, error)) return file;
+    const fs::path shipped = folder / file;
+    return fs::exists(shipped, error) ? shipped.string() : file;
+}
+
+Result<std::string> find_shipped(FileKind kind, const std::string& name) {
     const std::vector<ShippedFile> shipped = shipped_files(kind);
     std::vector<std::string> names, with_this_stem;
     for (const ShippedFile& s : shipped) {
-        if (s.name == file_or_name) return s.file;
-        if (fs::path(s.file).stem() == file_or_name) with_this_stem.push_back(s.file);
+        if (s.name == name) return s.file;
+        if (fs::path(s.file).stem() == name) with_this_stem.push_back(s.file);
         names.push_back(s.name);
     }
     if (with_this_stem.size() == 1) return with_this_stem.front();
     for (const ShippedFile& s : shipped_files(kind == FileKind::scene ? FileKind::scenario : FileKind::scene))
-        if (s.name == file_or_name) return other_kind(kind, file_or_name);
+        if (s.name == name) return other_kind(kind, name);
     return Error{fmt::format("no such file, expected a {0} file (TOML) or the name of a {0} that `narpa list` "
                              "shows{1}",
-                             expected, did_you_mean(fs::path(file_or_name).stem().string(), names)),
-                 file_or_name};
+                             kFileKindWords[static_cast<std::size_t>(kind)],
+                             did_you_mean(fs::path(name).stem().string(), names)),
+                 name};
 }
 
-namespace {
-
-Outcome list() {
-    nlohmann::json document;
-    for (const FileKind kind : {FileKind::scenario, FileKind::scene}) {
-        const std::string word = kKindWords[static_cast<std::size_t>(kind)];
-        say(kind == FileKind::scenario ? "scenarios, for `narpa rehearse NAME`:"
-                                       : "scenes, for `narpa check`, `run`, `render` and `scan`:");
-        nlohmann::json files = nlohmann::json::array();
-        for (const ShippedFile& s : shipped_files(kind)) {
-            say(fmt::format("  {:<26} {}", s.name, s.about));
-            files.push_back({{"name", s.name}, {"file", s.file}, {"about", s.about}});
-        }
-        document[word + "s"] = files;
-    }
-    const fs::path folder = shipped_folder();
-    if (folder.empty())
-        return Error{"no scenes lie beside the program, expected them in ../scenes or ../share/narpa/scenes"};
-    document["folder"] = folder.string();
-    say("files: " + folder.string());
-    return document;
-}
-
-}  // namespace
-
-Command add_list(Parser app) {
-    const Parser c = app.subcommand("list", "Name the scenarios and scenes that come with narpa");
-    c.group("Start here");
-    return [] { return list(); };
-}
-
-}  // namespace narpa::cli
+}  // namespace narpa

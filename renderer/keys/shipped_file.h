@@ -1,16 +1,23 @@
-/// apps/shipped.h - scene and scenario files: by path, or by the name of one that comes with narpa.
+/// renderer/keys/shipped_file.h - scene and scenario files: by path, or by the name of one that comes with narpa.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
 
-namespace narpa::cli {
+namespace narpa {
 
 enum class FileKind : std::uint8_t { scene, scenario };
+inline constexpr std::array<std::string_view, 2> kFileKindWords{"scene", "scenario"};
+
+/// The folder of the scenes beside the program, in a build and when installed; empty: there is none.
+[[nodiscard]] std::filesystem::path shipped_folder();
 
 struct ShippedFile {
     std::string name;   ///< "docking", "craft/craft-and-ball"
@@ -25,5 +32,9 @@ struct ShippedFile {
 /// The path of a file, or of the shipped file with this name. Errors: no such file or name; a file of the other
 /// kind.
 [[nodiscard]] Result<std::string> find_file(FileKind kind, const std::string& file_or_name);
+/// The file itself or, where there is none, the one under shipped_folder(): "docking/approach.csv".
+[[nodiscard]] std::string own_or_shipped(const std::string& file);
+/// The path of the shipped file with this name.
+[[nodiscard]] Result<std::string> find_shipped(FileKind kind, const std::string& name);
 
-}  // namespace narpa::cli
+}  // namespace narpa

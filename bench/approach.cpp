@@ -12,7 +12,7 @@
 #include "bench/statistics.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tracking/estimate_report.h"
 
 namespace narpa {

@@ -14,7 +14,7 @@
 #include "estimator/search/cloud_search.h"
 #include "estimator/search/template_matcher.h"
 #include "protocols/lidar/velodyne.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "renderer/projection/brown_conrady.h"
 #include "tracking/estimate_report.h"
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "renderer/camera/detector.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/detector/detector.h"
 
 namespace narpa {
 namespace {

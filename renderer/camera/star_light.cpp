@@ -8,9 +8,9 @@
 #include <span>
 
 #include "base/constants.h"
-#include "renderer/camera/lens.h"
-#include "renderer/camera/solar_bands.h"
+#include "renderer/detector/solar_bands.h"
 #include "renderer/geometry/flush_denormals.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa {
 namespace {

@@ -7,14 +7,14 @@
 #include <cassert>
 
 #include "base/constants.h"
-#include "renderer/camera/image_optics.h"
 #include "renderer/camera/star_light.h"
-#include "renderer/camera/sun_ghost.h"
 #include "renderer/frame/budgeted_frame.h"
 #include "renderer/frame/camera_rays.h"
 #include "renderer/frame/tuning.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/optics/image_optics.h"
+#include "renderer/optics/sun_ghost.h"
 
 namespace narpa {
 namespace {

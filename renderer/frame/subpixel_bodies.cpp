@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/camera/lens.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa {
 namespace {

@@ -5,9 +5,9 @@
 #include <numbers>
 #include <optional>
 
-#include "renderer/camera/lens.h"
 #include "renderer/frame/pixel_samples.h"
 #include "renderer/integrator/sampler.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa {
 namespace {

@@ -75,7 +75,7 @@ struct PointSpreadImage {
     std::vector<double> samples;
 };
 
-/// The blur of the lens, the same all over the image; renderer/camera/point_spread.h.
+/// The blur of the lens, the same all over the image; renderer/optics/point_spread.h.
 struct PointSpreadFunction {
     double sigma_px = 0;       ///< of a Gaussian; 0: none
     double cutoff_per_px = 0;  ///< diffraction: pixel pitch / (wavelength * f-number); 0: none
@@ -84,7 +84,7 @@ struct PointSpreadFunction {
 };
 
 /// Lens ghost: an image of the aperture in the Sun's light, by two reflections in the lens;
-/// renderer/camera/sun_ghost.h.
+/// renderer/optics/sun_ghost.h.
 struct Ghost {
     double strength = 0;  ///< share of the Sun's light that enters the aperture
     double radius_px = 1;

@@ -8,7 +8,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pnp/pnp.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/estimator/pnp/pnp_support.h"
 #include "tests/support/cameras.h"
 #include "tests/support/shapes.h"

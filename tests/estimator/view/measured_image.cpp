@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/support/cameras.h"
 
 namespace narpa {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/renderer/camera/detector_support.h"
+#include "tests/renderer/detector/detector_support.h"
 
 namespace narpa::test {
 namespace {

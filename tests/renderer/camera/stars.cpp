@@ -1,7 +1,7 @@
 // Stars in the image: where they stand, how much light they give, what hides them.
 #include <tbb/global_control.h>
 
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/renderer/camera/star_support.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/cameras.h"

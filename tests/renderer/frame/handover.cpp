@@ -1,9 +1,9 @@
 // From a point of light to a body that the image resolves: the light goes on without a step.
 #include <gtest/gtest.h>
 
-#include "renderer/camera/point_response.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/camera_image.h"
+#include "renderer/optics/point_response.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/support/cameras.h"
 #include "tests/support/shapes.h"

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "base/constants.h"
-#include "renderer/camera/detector.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/detector/detector.h"
 #include "renderer/frame/camera_image.h"
 #include "tests/support/cameras.h"
 #include "tests/support/shapes.h"

@@ -4,11 +4,16 @@
 #include <cmath>
 #include <limits>
 
-#include "renderer/detector/collect.h"
 #include "renderer/detector/noise.h"
+#include "renderer/keys/toml_reader.h"
 
 namespace narpa {
 namespace {
+
+constexpr TableKey kCosmicRayRows[]{
+    {"cosmic_rays_per_cm2_s", rows::number({.low = 0, .high = 1e6})},
+    {"sensitive_depth_m", rows::number({.low = 0, .high = 0.01, .low_open = true})},
+};
 
 /// A straight track, in pixels: the pixel of column 0 and row 0 is the square from (0, 0) to (1, 1).
 struct Track {
@@ -54,37 +59,59 @@ void deposit(const Track& track, int width, int height, std::span<float> charge_
     }
 }
 
-}  // namespace
+class CosmicRayHits final : public DetectorStage {
+public:
+    explicit CosmicRayHits(const CosmicRays& rays) : rays_(rays) {}
+    [[nodiscard]] Place place() const noexcept override { return Place::collection; }
+    void act(const ChargePlane& plane) const noexcept override;
 
-double mean_cosmic_rays(const Camera& camera) noexcept {
-    const Detector& d = *camera.detector;
-    const double pixels = static_cast<double>(camera.width) * camera.height;
-    const double area_cm2 = pixels * d.pixel_pitch_m * d.pixel_pitch_m * 1e4;
-    return std::min(d.cosmic_rays_per_cm2_s * area_cm2 * d.exposure_s, pixels);
-}
+private:
+    CosmicRays rays_;
+};
 
-void add_cosmic_rays(const Camera& camera, const PhiloxSchedule& random, std::uint32_t frame, std::uint32_t band,
-                     std::span<float> charge_e) noexcept {
-    const Detector& d = *camera.detector;
-    const std::uint32_t number_draw = SensorDraw::kHits + 3 * band;
+void CosmicRayHits::act(const ChargePlane& plane) const noexcept {
+    const int width = plane.sensor.width, height = plane.sensor.height;
+    const std::uint32_t number_draw = SensorDraw::kHits + 3 * plane.band;
     Lanes<double> mean{};
-    mean[0] = mean_cosmic_rays(camera);
-    const RandomLanes first = philox(random, 0, frame, number_draw);
+    mean[0] = mean_cosmic_rays(rays_, plane.sensor);
+    const RandomLanes first = philox(plane.random, 0, plane.frame, number_draw);
     const auto number = static_cast<std::uint32_t>(poisson(mean, normals(first), first)[0]);
     for (std::uint32_t hit = 0; hit < number; hit += kLanes) {
-        const RandomLanes place = philox(random, hit, frame, number_draw + 1),
-                          direction = philox(random, hit, frame, number_draw + 2);
+        const RandomLanes place = philox(plane.random, hit, plane.frame, number_draw + 1),
+                          direction = philox(plane.random, hit, plane.frame, number_draw + 2);
         for (std::size_t i = 0; i < kLanes && hit + i < number; ++i) {
             const double cosine_squared = unit(direction.w0[i]), cosine = std::sqrt(cosine_squared);
             const SineCosine azimuth = sincos_of_word(direction.w1[i]);
-            const double reach =
-                d.sensitive_depth_m / d.pixel_pitch_m * std::sqrt(1 - cosine_squared) / cosine;  // px
-            deposit({unit(place.w0[i]) * camera.width, unit(place.w1[i]) * camera.height,
+            const double reach = rays_.sensitive_depth_m / plane.sensor.detector->pixel_pitch_m *
+                                 std::sqrt(1 - cosine_squared) / cosine;  // px
+            deposit({unit(place.w0[i]) * width, unit(place.w1[i]) * height,
                      reach * static_cast<double>(azimuth.cosine), reach * static_cast<double>(azimuth.sine),
-                     kCosmicRayElectrons_per_m * d.sensitive_depth_m / cosine},
-                    camera.width, camera.height, charge_e);
+                     kCosmicRayElectrons_per_m * rays_.sensitive_depth_m / cosine},
+                    width, height, plane.charge_e);
         }
     }
 }
+
+void read_cosmic_rays(TableReader& table, Detector& d) {
+    CosmicRays rays;
+    table.read("cosmic_rays_per_cm2_s", rays.per_cm2_s);
+    table.read("sensitive_depth_m", rays.sensitive_depth_m);
+    if (rays.per_cm2_s > 0) d.stages.push_back(cosmic_rays(rays));
+}
+
+}  // namespace
+
+std::shared_ptr<const DetectorStage> cosmic_rays(const CosmicRays& rays) {
+    return std::make_shared<CosmicRayHits>(rays);
+}
+
+double mean_cosmic_rays(const CosmicRays& rays, const ImageSensor& sensor) noexcept {
+    const Detector& d = *sensor.detector;
+    const double pixels = static_cast<double>(sensor.width) * sensor.height;
+    const double area_cm2 = pixels * d.pixel_pitch_m * d.pixel_pitch_m * 1e4;
+    return std::min(rays.per_cm2_s * area_cm2 * d.exposure_s, pixels);
+}
+
+constinit const DetectorStageKind kCosmicRays{kCosmicRayRows, read_cosmic_rays};
 
 }  // namespace narpa

@@ -6,23 +6,23 @@
 /// (Landau), secondary electrons and diffusion are left out.
 #pragma once
 
-#include <cstdint>
-#include <span>
-
-#include "base/counter_random.h"
-#include "renderer/scene/scene.h"
+#include "renderer/detector/detector_stage.h"
 
 namespace narpa {
 
 inline constexpr double kCosmicRayElectrons_per_m = 73e6;
 
-/// Mean number on the sensor in one exposure: rate * area * exposure time, at most one per pixel.
-[[nodiscard]] double mean_cosmic_rays(const Camera& camera) noexcept;
+struct CosmicRays {
+    double per_cm2_s = 0;
+    double sensitive_depth_m = 1e-5;  ///< of the silicon that collects their charge
+};
+/// Adds the charge of a frame's hits. The number of hits is Poisson; their places are uniform; the zenith angle of
+/// particles that cross a plane has P(cos < c) = c^2.
+[[nodiscard]] std::shared_ptr<const DetectorStage> cosmic_rays(const CosmicRays& rays);
 
-/// Adds the charge of a frame's hits to one band's photosites, row-major, `camera.height` x `camera.width`. The
-/// number of hits is Poisson; their places are uniform; the zenith angle of particles that cross a plane has P(cos
-/// < c) = c^2. The camera must have a detector.
-void add_cosmic_rays(const Camera& camera, const PhiloxSchedule& random, std::uint32_t frame, std::uint32_t band,
-                     std::span<float> charge_e) noexcept;
+/// Mean number on the sensor in one exposure: rate * area * exposure time, at most one per pixel.
+[[nodiscard]] double mean_cosmic_rays(const CosmicRays& rays, const ImageSensor& sensor) noexcept;
+
+extern const DetectorStageKind kCosmicRays;
 
 }  // namespace narpa

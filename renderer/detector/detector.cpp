@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/each_isa.h"
+#include "renderer/detector/detector_stage.h"
 #include "renderer/detector/digitise.h"
 #include "renderer/detector/pixel_tasks.h"
 #include "renderer/detector/sensor_array.h"
@@ -35,14 +36,14 @@ void set_detector(const Detector& d, DetectorConstants& s) {
 }
 
 /// No noise, as many bits as the format has, white_radiance at full scale.
-void set_ideal(const Camera& c, DetectorConstants& s) {
+void set_ideal(const ImageSensor& c, DetectorConstants& s) {
     s.bits = is_16_bit(c.format) ? 16 : 8;
     s.electrons_per_radiance.fill((is_mono(c.format) ? 1.0 / 3 : 1.0) / c.white_radiance);
     s.full_well_e = std::numeric_limits<double>::infinity();
     s.dn_per_e = (1 << s.bits) - 1;
 }
 
-void set_mosaic(const Camera& c, DetectorConstants& s) {
+void set_mosaic(const ImageSensor& c, DetectorConstants& s) {
     s.rows_per_pixel = 1.0 / c.width;
     for (int y = 0; y < 2; ++y)
         for (int x = 0; x < static_cast<int>(kLanes); ++x)
@@ -51,18 +52,18 @@ void set_mosaic(const Camera& c, DetectorConstants& s) {
 
 }  // namespace
 
-DetectorConstants detector_constants(const Camera& c, std::uint64_t seed, std::uint32_t frame) noexcept {
+DetectorConstants detector_constants(const ImageSensor& c, std::uint64_t seed, std::uint32_t frame) noexcept {
     DetectorConstants s;
     if (c.detector) {
         set_detector(*c.detector, s);
     } else {
         set_ideal(c, s);
     }
-    const double limit_e = std::min(0x1p28 / s.dn_per_e, 0x1p120);  // range of the samplers in noise.h
+    s.limit_e = std::min(0x1p28 / s.dn_per_e, 0x1p120);  // range of the samplers in noise.h
     for (std::size_t b = 0; b < 3; ++b)
-        s.radiance_max[b] = static_cast<float>(std::min(limit_e / s.electrons_per_radiance[b], 1e30));
-    s.full_well_e = std::min(s.full_well_e, limit_e);
-    s.read_noise_e = std::min(s.read_noise_e, limit_e);
+        s.radiance_max[b] = static_cast<float>(std::min(s.limit_e / s.electrons_per_radiance[b], 1e30));
+    s.full_well_e = std::min(s.full_well_e, s.limit_e);
+    s.read_noise_e = std::min(s.read_noise_e, s.limit_e);
     s.top_dn = (1 << s.bits) - 1;
     s.full_dn = std::min(s.top_dn, static_cast<std::int32_t>(s.full_well_e * s.dn_per_e + (s.black_dn + 0.5)));
     s.dark = DarkLevels(s.black_dn, s.read_noise_e * s.dn_per_e, s.top_dn);
@@ -88,23 +89,23 @@ double dark_seconds(const Detector& d) noexcept {
 }
 
 double dark_electrons(const Detector& d) noexcept {
-    return d.dark_current_e_s * dark_seconds(d);
+    return site_amounts(d).dark_e;
 }
 
-void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
+void expose(const ImageSensor& sensor, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
             std::span<std::uint8_t> out, SensorArray* array) noexcept {
-    if (array != nullptr) return array->expose(camera, radiance, seed, frame, out);
-    const DetectorConstants sensor = detector_constants(camera, seed, frame);
+    if (array != nullptr) return array->expose(sensor, radiance, seed, frame, out);
+    const DetectorConstants constants = detector_constants(sensor, seed, frame);
     for_each_task(radiance.pixels, [&](std::size_t first, std::span<const Rgb> part) {
-        std::uint8_t* const bytes = out.data() + first * bytes_per_pixel(camera.format);
-        is_bayer(camera.format) ? write_mosaic(sensor, camera.format, part, first, bytes)
-                                : write(sensor, camera.format, part, first, bytes);
+        std::uint8_t* const bytes = out.data() + first * bytes_per_pixel(sensor.format);
+        is_bayer(sensor.format) ? write_mosaic(constants, sensor.format, part, first, bytes)
+                                : write(constants, sensor.format, part, first, bytes);
     });
 }
 
-void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
+void expose(const ImageSensor& sensor, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
             std::span<std::uint8_t> out) {
-    expose(camera, radiance, seed, frame, out, SensorArray::create(camera, seed).get());
+    expose(sensor, radiance, seed, frame, out, SensorArray::create(sensor, seed).get());
 }
 
 }  // namespace narpa

@@ -9,8 +9,8 @@
 /// Signals are double, noise is single precision (noise.h); pixels without light draw their DN from a table
 /// (dark_levels.h).
 ///
-/// Dark current and differences between pixels are in sensor_array.h; if the scene names none of them, none of that
-/// code runs.
+/// Dark current, differences between pixels and other stages that a scene may name are in sensor_array.h; if it
+/// names none of them, none of that code runs.
 ///
 /// DN to bytes: GREY the top 8 bits; Y16 little-endian, left-justified; Bayer mosaics the same; RGB24 the top 8
 /// bits of each band; YUYV from these by BT.601, limited range, chroma averaged over each pair. Values stay linear:
@@ -21,21 +21,21 @@
 #include <span>
 
 #include "base/radiance_image.h"
-#include "renderer/scene/scene.h"
+#include "renderer/detector/detector_settings.h"
 
 namespace narpa {
 
 class SensorArray;
 
-/// Exposes the radiance image and writes the frame's bytes in `camera.format`. Noise depends on (seed, frame,
+/// Exposes the radiance image and writes the frame's bytes in `sensor.format`. Noise depends on (seed, frame,
 /// pixel) and nothing else: same bytes on any number of threads and on each instruction set. Without a detector: DN
 /// = full scale * radiance / white_radiance, clamped; monochrome takes the mean of the bands. `out` holds
-/// frame_bytes(format) bytes, and the camera's size fits the format. Allocates nothing; runs on the calling
-/// thread's TBB arena. `array`: of SensorArray::create for this camera and seed, which may be null.
-void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
+/// frame_bytes(format) bytes, and the image's size fits the format. Allocates nothing; runs on the calling
+/// thread's TBB arena. `array`: of SensorArray::create for this sensor and seed, which may be null.
+void expose(const ImageSensor& sensor, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
             std::span<std::uint8_t> out, SensorArray* array) noexcept;
 /// The same for a single frame: creates the sensor array for it, if the detector needs one.
-void expose(const Camera& camera, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
+void expose(const ImageSensor& sensor, const RadianceImage& radiance, std::uint64_t seed, std::uint32_t frame,
             std::span<std::uint8_t> out);
 
 /// Electrons that radiance 1 W m^-2 sr^-1 in one band (0 red, 1 green, 2 blue) collects in one exposure.

@@ -11,37 +11,11 @@
 #include "base/pixel_format.h"
 #include "base/pose.h"
 #include "protocols/camera_control.h"
+#include "renderer/detector/detector_settings.h"
 #include "renderer/projection/pinhole.h"
 #include "renderer/scene/course.h"
 
 namespace narpa {
-
-/// Photons to digital numbers. Absent: an ideal sensor without noise (see Camera::white_radiance). Amounts of 0 and
-/// switches that are false are exactly off.
-struct Detector {
-    double exposure_s = 0.01;  ///< exposure stops included
-    double pixel_pitch_m = 5e-6;
-    double f_number = 4;
-    double quantum_efficiency = 0.5;  ///< electrons per photon
-    double full_well_e = 20000;
-    double gain_e_per_dn = 0;  ///< 0: full_well_e / (2^bits - 1 - black_level_dn)
-    double read_noise_e = 0;   ///< RMS
-    bool shot_noise = false;   ///< Poisson
-    int black_level_dn = 0;
-    int bits = 12;  ///< ADC, 8..16
-
-    double dark_current_e_s = 0;  ///< mean of a pixel, at dark_reference_c
-    double temperature_c = 20, dark_reference_c = 20;
-    double dark_doubling_c = 7;  ///< temperature step, K, that doubles the dark current
-    double prnu = 0;             ///< relative standard deviation of the pixels' gains: EMVA's PRNU_1288
-    double dsnu_e = 0;           ///< standard deviation of the pixels' offsets: EMVA's DSNU_1288
-    double dead_pixel_share = 0;
-    double hot_pixel_share = 0, hot_pixel_e_s = 0;      ///< dark current added, at dark_reference_c
-    double blinking_pixel_share = 0, blinking_e_s = 0;  ///< the same, in half of the frames
-    bool blooming = false;
-    double cosmic_rays_per_cm2_s = 0;
-    double sensitive_depth_m = 1e-5;  ///< of the silicon that collects a cosmic ray's charge
-};
 
 /// Thin lens: a point off the focus distance, at depth z, is blurred to a circle of aperture * fx * |1/focus - 1/z|
 /// pixels.
@@ -112,8 +86,8 @@ struct Camera {
     PixelFormat format = PixelFormat::grey;
     bool embedded_line = false;  ///< the last row carries the frame's identity and ledger
     LatePolicy late = LatePolicy::late;
-    double white_radiance = 0;  ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
-    std::optional<Detector> detector;
+    double white_radiance = 0;         ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
+    std::optional<Detector> detector;  ///< none: an ideal sensor without noise (see white_radiance)
     std::optional<Shutter> shutter{};
     std::optional<CameraControlLimits> control{};
     std::optional<Lens> lens{};  ///< none: a pinhole
@@ -121,6 +95,11 @@ struct Camera {
     std::optional<Vignetting> vignetting{};
     double veiling_glare = 0;  ///< share of the light that is spread evenly over the image
     std::optional<Ghost> ghost{};
+
+    /// Valid while the camera stays as it is.
+    operator ImageSensor() const noexcept {  // NOLINT(google-explicit-constructor)
+        return {name, width, height, format, white_radiance, detector ? &*detector : nullptr};
+    }
 };
 
 }  // namespace narpa

@@ -166,9 +166,9 @@ TEST(PhotonTransfer, FramesGiveTheScenesPrnuAndDsnu) {
     }
     const Moments dark = bench.spatial(0), lit = bench.spatial(half);
     const double dsnu_e = std::sqrt(dark.variance) / gain_dn;
-    EXPECT_NEAR(dsnu_e / scene.dsnu_e, 1, 0.01);
+    EXPECT_NEAR(dsnu_e / site_amounts(scene).dsnu_e, 1, 0.01);
     const double prnu = std::sqrt(lit.variance - dark.variance) / (lit.mean - dark.mean);
-    EXPECT_NEAR(prnu / scene.prnu, 1, 0.01);
+    EXPECT_NEAR(prnu / site_amounts(scene).prnu, 1, 0.01);
 }
 
 TEST(PhotonTransfer, FramesGiveTheScenesDarkCurrentAtItsTemperature) {

@@ -8,8 +8,15 @@
 #include <set>
 
 #include "base/each_isa.h"
+#include "renderer/detector/blooming.h"
 #include "renderer/detector/collect.h"
+#include "renderer/detector/cosmic_rays.h"
+#include "renderer/detector/dark_current.h"
+#include "renderer/detector/defective_pixels.h"
+#include "renderer/detector/detector_stage.h"
+#include "renderer/detector/nonuniformity.h"
 #include "tests/renderer/detector/detector_support.h"
+#include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/allocation_counter.h"
 
 namespace narpa {
@@ -20,17 +27,15 @@ using namespace test;
 constexpr PixelFormat kArrayFormats[] = {PixelFormat::grey, PixelFormat::y16,   PixelFormat::rgb24,
                                          PixelFormat::yuyv, PixelFormat::grbg8, PixelFormat::bggr16};
 
-Camera with_everything(int width, int height, PixelFormat format) {
+Camera with_everything(int width, int height, PixelFormat format, bool moving = true) {
     Camera c = noisy_camera(width, height, format);
     Detector& d = *c.detector;
-    d.dark_current_e_s = 500;
     d.temperature_c = 30;
-    d.prnu = 0.02;
-    d.dsnu_e = 4;
-    d.dead_pixel_share = d.hot_pixel_share = d.blinking_pixel_share = 0.01;
-    d.hot_pixel_e_s = d.blinking_e_s = 1e5;
-    d.blooming = true;
-    d.cosmic_rays_per_cm2_s = 1e5;
+    d.stages = {
+        dark_current(500), nonuniformity({.prnu = 0.02, .dsnu_e = 4}),
+        defective_pixels(
+            {.dead_share = 0.01, .hot_share = 0.01, .hot_e_s = 1e5, .blinking_share = 0.01, .blinking_e_s = 1e5})};
+    if (moving) d.stages.insert(d.stages.end(), {blooming(), cosmic_rays({.per_cm2_s = 1e5})});
     return c;
 }
 /// Sites whose electrons fulfil the condition.
@@ -42,21 +47,30 @@ std::set<std::size_t> sites_with(const std::vector<int>& e, const F& condition) 
     return sites;
 }
 
+constexpr TableKey kCameraRows[]{{"detector", rows::table(kDetectorKeys)}};
+constexpr TableKeys kKeysOfCamera{.rows = kCameraRows};
+
+/// The detector of a camera with this text in [camera.detector].
+Detector detector_of(const std::string& text) {
+    return read_table("[detector]\n" + text, kKeysOfCamera,
+                      [](TableReader& camera) { return *read_detector(camera, 1'000'000'000); });
+}
+
 TEST(SensorArray, IsThereOnlyWhereTheDetectorNamesSomethingOfIt) {
     Camera c = noisy_camera(8, 8, PixelFormat::y16);
-    EXPECT_EQ(SensorArray::create(c, 1), nullptr);
-    c.detector->temperature_c = 60, c.detector->dark_doubling_c = 5, c.detector->sensitive_depth_m = 1;
-    EXPECT_EQ(SensorArray::create(c, 1), nullptr) << "of no dark current";
-    const auto named = [&](auto member, auto value) {
-        Camera one = c;
-        (*one.detector).*member = value;
-        return SensorArray::create(one, 1) != nullptr;
+    const auto is_there = [&](const std::string& text) {
+        c.detector = detector_of(text);
+        return SensorArray::create(c, 1) != nullptr;
     };
-    for (const auto member :
-         {&Detector::dark_current_e_s, &Detector::prnu, &Detector::dsnu_e, &Detector::dead_pixel_share,
-          &Detector::hot_pixel_share, &Detector::blinking_pixel_share, &Detector::cosmic_rays_per_cm2_s})
-        EXPECT_TRUE(named(member, 0.01));
-    EXPECT_TRUE(named(&Detector::blooming, true));
+    EXPECT_FALSE(is_there(""));
+    EXPECT_FALSE(is_there("temperature_c = 60\ndark_doubling_c = 5\nsensitive_depth_m = 0.01"))
+        << "no dark current";
+    EXPECT_FALSE(is_there("prnu = 0\ndsnu_e = 0\ndead_pixel_share = 0\nblooming = false\ndark_current_e_s = 0"));
+    for (const char* text :
+         {"dark_current_e_s = 0.01", "prnu = 0.01", "dsnu_e = 0.01", "dead_pixel_share = 0.01",
+          "hot_pixel_share = 0.01\nhot_pixel_e_s = 1", "blinking_pixel_share = 0.01\nblinking_e_s = 1",
+          "cosmic_rays_per_cm2_s = 0.01", "blooming = true"})
+        EXPECT_TRUE(is_there(text)) << text;
     c.detector.reset();
     EXPECT_EQ(SensorArray::create(c, 1), nullptr);
 }
@@ -69,22 +83,19 @@ TEST(SensorArray, WithoutEffectGivesThePlainNumbersOfLitPixels) {
         for (Rgb& p : image.pixels)
             for (int b = 0; b < 3; ++b) p[b] = p[b] > 0.01f && p[b] < 2 ? p[b] : 1.0f;
         const auto plain = bytes_of(c, image);
-        c.detector->blooming = true;
+        c.detector->stages = {blooming()};
         EXPECT_EQ(bytes_of(c, image), plain) << name(format);
-        c.detector->blooming = false;
-        c.detector->cosmic_rays_per_cm2_s = 1e-9;
+        c.detector->stages = {cosmic_rays({.per_cm2_s = 1e-9})};
         EXPECT_EQ(bytes_of(c, image), plain) << name(format);
-        c.detector->dsnu_e = 1e-12;
+        c.detector->stages.push_back(nonuniformity({.dsnu_e = 1e-12}));
         EXPECT_EQ(bytes_of(c, image), plain) << name(format);
     }
 }
 
 TEST(SensorArray, PatternsAreTheSameInEachFrameAndOthersOnOtherCameras) {
     Camera c = counting(100, 100);
-    c.detector->dsnu_e = 10;
-    c.detector->prnu = 0.05;
-    c.detector->dead_pixel_share = c.detector->hot_pixel_share = 0.02;
-    c.detector->hot_pixel_e_s = 3e5;
+    c.detector->stages = {nonuniformity({.prnu = 0.05, .dsnu_e = 10}),
+                          defective_pixels({.dead_share = 0.02, .hot_share = 0.02, .hot_e_s = 3e5})};
     RadianceImage image(100, 100);
     std::fill(image.pixels.begin(), image.pixels.end(), radiance_for(*c.detector, 5000));
     const std::vector<int> first = electrons(c, image, 0);
@@ -102,7 +113,7 @@ TEST(SensorArray, PatternsAreTheSameInEachFrameAndOthersOnOtherCameras) {
 
 TEST(SensorArray, DarkCurrentDoublesWithTemperature) {
     Camera c = counting(4, 4);
-    c.detector->dark_current_e_s = 20000;  // 200 e- in 10 ms
+    c.detector->stages = {dark_current(20000)};  // 200 e- in 10 ms
     const auto dark_at = [&](double celsius) {
         c.detector->temperature_c = celsius;
         return dark_electrons_of(c)[5];
@@ -119,10 +130,12 @@ TEST(SensorArray, DarkCurrentDoublesWithTemperature) {
 
 TEST(SensorArray, DefectsHaveTheirSharesAndCurrents) {
     Camera c = counting(1000, 1000);
-    Detector& d = *c.detector;
-    d.dark_current_e_s = 10'000;  // 100 e-
-    d.dead_pixel_share = 0.001, d.hot_pixel_share = 0.002, d.blinking_pixel_share = 0.004;
-    d.hot_pixel_e_s = 3e5, d.blinking_e_s = 2e5;
+    c.detector->stages = {dark_current(10'000),  // 100 e-
+                          defective_pixels({.dead_share = 0.001,
+                                            .hot_share = 0.002,
+                                            .hot_e_s = 3e5,
+                                            .blinking_share = 0.004,
+                                            .blinking_e_s = 2e5})};
     const auto array = SensorArray::create(c, 1);
     const RadianceImage black(c.width, c.height);
     std::vector<std::uint8_t> bytes(2'000'000);
@@ -152,7 +165,7 @@ TEST(SensorArray, DefectsHaveTheirSharesAndCurrents) {
 
 TEST(SensorArray, DeadPixelsCollectNoLight) {
     Camera c = counting(200, 200);
-    c.detector->dead_pixel_share = 0.05;
+    c.detector->stages = {defective_pixels({.dead_share = 0.05})};
     RadianceImage image(200, 200);
     std::fill(image.pixels.begin(), image.pixels.end(), radiance_for(*c.detector, 5000));
     const auto dead = sites_with(electrons(c, image), [](int e) { return e == 0; });
@@ -165,8 +178,7 @@ TEST(SensorArray, SameBytesOnAnyNumberOfThreads) {
     const RadianceImage image = motley(322, 262);
     for (const PixelFormat format : kArrayFormats)
         for (const bool moving : {true, false}) {
-            Camera c = with_everything(image.width, image.height, format);
-            if (!moving) c.detector->blooming = false, c.detector->cosmic_rays_per_cm2_s = 0;
+            const Camera c = with_everything(image.width, image.height, format, moving);
             std::vector<std::uint8_t> one, many;
             tbb::task_arena(1).execute([&] { one = bytes_of(c, image); });
             tbb::task_arena(4).execute([&] { many = bytes_of(c, image); });
@@ -193,12 +205,19 @@ TEST(SensorArray, AllocatesNothingInAFrame) {
 TEST(SensorArray, TakesAnyRadianceAndTheLargestAmounts) {
     const RadianceImage image = motley(62, 30);
     for (const PixelFormat format : kArrayFormats) {
-        Camera c = with_everything(62, 30, format);
+        Camera c = noisy_camera(62, 30, format);
         Detector& d = *c.detector;
-        d.dark_current_e_s = d.dsnu_e = d.hot_pixel_e_s = d.blinking_e_s = d.read_noise_e = 1e300;
+        constexpr double kLargest = 1e300;
+        d.stages = {dark_current(kLargest), nonuniformity({.prnu = 0.02, .dsnu_e = kLargest}),
+                    defective_pixels({.dead_share = 0.01,
+                                      .hot_share = 0.01,
+                                      .hot_e_s = kLargest,
+                                      .blinking_share = 0.01,
+                                      .blinking_e_s = kLargest}),
+                    blooming(), cosmic_rays({.per_cm2_s = 1e6, .sensitive_depth_m = 0.01})};
         d.temperature_c = 200, d.dark_reference_c = -273.15, d.dark_doubling_c = 1;
-        d.sensitive_depth_m = 0.01, d.cosmic_rays_per_cm2_s = 1e6, d.pixel_pitch_m = 1;
-        d.full_well_e = 1e300;
+        d.pixel_pitch_m = 1;
+        d.read_noise_e = d.full_well_e = kLargest;
         EXPECT_EQ(bytes_of(c, image), bytes_of(c, image)) << name(format);
         d.gain_e_per_dn = 1e-300;
         EXPECT_EQ(bytes_of(c, image), bytes_of(c, image)) << name(format);

@@ -1,6 +1,7 @@
 // Charge that moves between photosites: blooming, and the tracks of cosmic rays.
 #include <gtest/gtest.h>
 
+#include "renderer/detector/blooming.h"
 #include "renderer/detector/cosmic_rays.h"
 #include "tests/renderer/detector/detector_support.h"
 
@@ -12,7 +13,7 @@ using namespace test;
 TEST(Blooming, SpillsEvenlyUpAndDownItsColumnAndConservesCharge) {
     Camera c = counting(37, 64);  // columns beyond whole batches
     c.detector->full_well_e = 1000;
-    c.detector->blooming = true;
+    c.detector->stages = {blooming()};
     RadianceImage image(37, 64);
     const auto lit = [&](int x, int y, double e) {
         image.pixels[static_cast<std::size_t>(y * 37 + x)] = radiance_for(*c.detector, e);
@@ -44,12 +45,12 @@ TEST(Blooming, SpillsEvenlyUpAndDownItsColumnAndConservesCharge) {
 TEST(Blooming, ChargeLeavesOnlyOverTheEdges) {
     Camera c = counting(16, 32);
     c.detector->full_well_e = 1000;
-    c.detector->blooming = true;
+    c.detector->stages = {blooming()};
     RadianceImage image(16, 32);
     image.pixels[2 * 16 + 5] = radiance_for(*c.detector, 11'000);  // 5000 up, where two pixels take 2000
     std::vector<int> e = electrons(c, image);
     EXPECT_EQ(std::accumulate(e.begin(), e.end(), 0), 8000);
-    c.detector->blooming = false;
+    c.detector->stages.clear();
     e = electrons(c, image);
     EXPECT_EQ(std::accumulate(e.begin(), e.end(), 0), 1000) << "without blooming it is lost";
 }
@@ -67,7 +68,7 @@ TEST(Blooming, KeepsTheChargeOfAnyImage) {
             image.pixels[static_cast<std::size_t>(y * 64 + x)] = radiance_for(*c.detector, e);
             light += e;
         }
-    c.detector->blooming = true;
+    c.detector->stages = {blooming()};
     double charge = 0;
     for (const int e : electrons(c, image)) {
         EXPECT_LE(e, 2000);
@@ -105,10 +106,10 @@ TEST(CosmicRays, NumberMatchesTheRateAndChargeTheDepth) {
     // +- 72. In a layer of 1 um most touch one pixel or two; two hits of a frame touch in 0.2 % of the pairs.
     Camera c = counting(256, 256);
     c.detector->pixel_pitch_m = 1e-5;
-    c.detector->cosmic_rays_per_cm2_s = 20'000;
-    c.detector->sensitive_depth_m = 1e-6;
+    const CosmicRays rays{.per_cm2_s = 20'000, .sensitive_depth_m = 1e-6};
+    c.detector->stages = {cosmic_rays(rays)};
     c.detector->gain_e_per_dn = 0.1;  // 0.1 e- a DN: charge in tenths
-    EXPECT_NEAR(mean_cosmic_rays(c), 13.107, 0.001);
+    EXPECT_NEAR(mean_cosmic_rays(rays, c), 13.107, 0.001);
     double hits = 0, squares = 0;
     std::vector<double> of_hit;
     for (std::uint32_t frame = 0; frame < 400; ++frame) {
@@ -131,8 +132,7 @@ TEST(CosmicRays, TracksAreStraightAndHoldTheirCharge) {
     // Deep silicon and small pixels: long tracks. One hit a frame on average.
     Camera c = counting(200, 200);
     c.detector->pixel_pitch_m = 1e-6;
-    c.detector->sensitive_depth_m = 1e-5;
-    c.detector->cosmic_rays_per_cm2_s = 1e6;
+    c.detector->stages = {cosmic_rays({.per_cm2_s = 1e6, .sensitive_depth_m = 1e-5})};
     c.detector->exposure_s = 0.0025;
     int tracks = 0;
     for (std::uint32_t frame = 0; frame < 200; ++frame) {
@@ -166,7 +166,7 @@ TEST(CosmicRays, TracksAreStraightAndHoldTheirCharge) {
 
 TEST(CosmicRays, AreRepeatableAndOthersInEachFrame) {
     Camera c = counting(256, 256);
-    c.detector->cosmic_rays_per_cm2_s = 1e6;
+    c.detector->stages = {cosmic_rays({.per_cm2_s = 1e6})};
     EXPECT_EQ(dark_electrons_of(c, 4), dark_electrons_of(c, 4));
     EXPECT_NE(dark_electrons_of(c, 4), dark_electrons_of(c, 5));
 }

@@ -38,7 +38,7 @@ Camera without(const std::vector<std::string>& ignored, Camera camera) {
         if (what == "distortion") camera.model = std::make_shared<const Pinhole>(paraxial_pinhole(*camera.model));
         if (what == "rows" && camera.shutter) camera.shutter->row_time_ns = 0;
         if (what == "shutter") camera.shutter.reset();
-        if (what == "psf") camera.point_spread.reset();
+        if (what == "psf") camera.optics.point_spread.reset();
     }
     return camera;
 }

@@ -137,7 +137,7 @@ void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t sam
 }
 
 bool Collector::share_out(const ImagePoint& p, std::size_t i) {
-    const bool spread = f_.camera.point_spread.has_value();
+    const bool spread = f_.camera.optics.point_spread.has_value();
     bool any = false;
     for (std::size_t pixel = 0; pixel < block_.n; ++pixel) {
         columns_[i][pixel] = pixel_share(spread, block_.x[pixel] - p.x);

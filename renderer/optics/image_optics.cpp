@@ -7,28 +7,27 @@
 #include <span>
 
 #include "base/each_isa.h"
-#include "renderer/scene/scene.h"
 
 namespace narpa {
 namespace {
 
 constexpr int kBands = 3;
 
-/// Share of the light that passes the lens at an angle from the axis, radians.
-double relative_illumination(const Vignetting& v, double theta) {
-    const double s = theta * theta, cosine = std::max(0.0, std::cos(theta));
-    const auto [a, b, c] = v.polynomial;
-    return std::max(0.0, (v.cos4 ? std::pow(cosine, 4) : 1) * (1 + s * (a + s * (b + s * c))));
-}
-
-std::vector<float> gain_of(const Camera& camera) {
+/// Share of the light that vignetting leaves at each pixel; empty: all of it.
+std::vector<float> gain_of(const Optics& optics, const ImagePlane& plane) {
+    std::vector<const OpticalEffect*> vignettes;
+    for (const auto& effect : optics.effects)
+        if (effect->vignettes()) vignettes.push_back(effect.get());
     std::vector<float> gain;
-    gain.reserve(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
-    for (int y = 0; y < camera.height; ++y)
-        for (int x = 0; x < camera.width; ++x) {
-            const Vec3 d = camera.model->direction({static_cast<double>(x), static_cast<double>(y)});
-            gain.push_back(static_cast<float>(
-                relative_illumination(*camera.vignetting, std::atan2(std::hypot(d.x, d.y), d.z))));
+    if (vignettes.empty()) return gain;
+    gain.reserve(static_cast<std::size_t>(plane.width) * static_cast<std::size_t>(plane.height));
+    for (int y = 0; y < plane.height; ++y)
+        for (int x = 0; x < plane.width; ++x) {
+            const Vec3 d = plane.model->direction({static_cast<double>(x), static_cast<double>(y)});
+            const double angle_rad = std::atan2(std::hypot(d.x, d.y), d.z);
+            double share = 1;
+            for (const OpticalEffect* effect : vignettes) share *= effect->transmission(angle_rad);
+            gain.push_back(static_cast<float>(share));
         }
     return gain;
 }
@@ -44,15 +43,13 @@ float* floats_of(RadianceImage& image, int y) noexcept {
 
 }  // namespace
 
-ImageOptics::ImageOptics(const Camera& camera)
-    : any_(camera.vignetting || camera.point_spread || camera.veiling_glare > 0),
-      width_(camera.width),
-      height_(camera.height),
-      veil_(static_cast<float>(camera.veiling_glare)) {
-    if (!camera.vignetting && !camera.point_spread) return;
-    if (camera.vignetting) gain_ = gain_of(camera);
-    if (camera.point_spread)
-        filter_ = filter_of(*camera.point_spread);
+ImageOptics::ImageOptics(const Optics& optics, const ImagePlane& plane)
+    : width_(plane.width), height_(plane.height), gain_(gain_of(optics, plane)) {
+    for (const auto& effect : optics.effects)
+        if (auto made = effect->make(plane)) effects_.push_back(std::move(made));
+    if (gain_.empty() && !optics.point_spread) return;
+    if (optics.point_spread)
+        filter_ = filter_of(*optics.point_spread);
     else
         filter_.terms = {{{1.0f}, {1.0f}}};
     rows_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
@@ -107,12 +104,6 @@ void ImageOptics::gather_row(const SeparableFilter::Term& term, int y, float* ou
     }
 }
 
-Rgb ImageOptics::mean(const RadianceImage& image) const noexcept {
-    Vec3 sum;
-    for (const Rgb& c : image.pixels) sum = sum + vec_cast<double>(c);
-    return vec_cast<float>(sum / static_cast<double>(image.pixels.size()));
-}
-
 void ImageOptics::apply(const RadianceImage& in, RadianceImage& out) noexcept {
     if (filter_.terms.empty()) {
         std::ranges::copy(in.pixels, out.pixels.begin());
@@ -126,10 +117,8 @@ void ImageOptics::apply(const RadianceImage& in, RadianceImage& out) noexcept {
     }
 }
 
-void ImageOptics::add_veiling_glare(RadianceImage& image) const noexcept {
-    if (!(veil_ > 0)) return;
-    const Rgb veil = veil_ * mean(image);
-    for (Rgb& c : image.pixels) c = (1 - veil_) * c + veil;
+void ImageOptics::add_effects(const ImageExposure& exposure, RadianceImage& image) noexcept {
+    for (const auto& effect : effects_) effect->apply(exposure, image);
 }
 
 float ImageOptics::gain_at(const ImagePoint& p) const noexcept {

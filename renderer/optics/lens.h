@@ -8,9 +8,12 @@
 #include <cmath>
 
 #include "base/concentric_disc.h"
-#include "renderer/scene/scene.h"
+#include "base/vec3.h"
+#include "renderer/optics/optical_effect.h"
 
 namespace narpa {
+
+extern const OpticsKind kThinLens;
 
 /// Diameter of the blurred image of a point at this depth along the camera's z axis: the circle of confusion, px.
 /// `focal_px`: px per unit of the plane z = 1.

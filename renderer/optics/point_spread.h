@@ -4,9 +4,11 @@
 #include <complex>
 #include <vector>
 
-#include "renderer/scene/scene.h"
+#include "renderer/optics/optical_effect.h"
 
 namespace narpa {
+
+extern const OpticsKind kPointSpread;
 
 /// The image of a point as a sum of products of one column and one row, each 2 radius + 1 long and centred on the
 /// point; it sums to 1.

@@ -8,40 +8,23 @@
 /// reflectances: 1.6e-3 for bare glass, 2.5e-5 for coatings that reflect 0.5 %.
 #pragma once
 
-#include <memory>
-#include <optional>
-
-#include "base/camera_pose.h"
-#include "base/radiance_image.h"
-#include "renderer/geometry/tracer.h"
-#include "renderer/light/medium.h"
-#include "renderer/scene/scene.h"
+#include "renderer/optics/optical_effect.h"
 
 namespace narpa {
 
-class SunGhost {
-public:
-    /// Null if the camera has no ghost or the scene no Sun.
-    static std::unique_ptr<const SunGhost> create(const Scene& scene, const Camera& camera);
-    SunGhost(const Sun& sun, const Ghost& ghost, const Camera& camera);
-
-    /// Adds a uniform disc to the image, unless the Sun is outside the ghost's angle or a body occludes its centre
-    /// at mid-exposure. Its pixels' radiance makes the detector collect `strength` times the Sun's light through
-    /// the aperture, irradiance * cos(angle from the axis), fading over the last tenth of the ghost's angle and
-    /// attenuated by `medium`, which may be null. Each row shows the disc at the middle of the row's exposure. The
-    /// light is accurate to 0.5 % for a radius of 5 px or more, to 4 % at 1 px. Allocates nothing.
-    void add(const Tracer& tracer, const Medium* medium, const BodyPoses& at, const CameraPose& pose,
-             RadianceImage& image) const noexcept;
-
-private:
-    [[nodiscard]] std::optional<ImagePoint> centre(const Rigid3& T_world_camera) const noexcept;
-    [[nodiscard]] double share_within_hood(double angle_rad) const noexcept;
-    void add_row(const ImagePoint& centre, const Rgb& radiance, int y, RadianceImage& image) const noexcept;
-
-    Sun sun_;
-    Ghost ghost_;
-    std::shared_ptr<const CameraModel> model_;
-    ImagePoint principal_;
+struct Ghost {
+    double strength = 0;  ///< share of the Sun's light that enters the aperture
+    double radius_px = 1;
+    double scale = 1;       ///< distance from the principal point over that of the Sun's image, on the other side
+    double within_rad = 0;  ///< angle of the Sun from the optical axis, below a right angle
 };
+/// Adds a uniform disc to the image, unless the Sun is outside the ghost's angle or a body occludes its centre at
+/// mid-exposure. Its pixels' radiance makes the detector collect `strength` times the Sun's light through the
+/// aperture, irradiance * cos(angle from the axis), fading over the last tenth of the ghost's angle and attenuated
+/// by the scene's medium. Each row shows the disc at the middle of the row's exposure. The light is accurate to
+/// 0.5 % for a radius of 5 px or more, to 4 % at 1 px.
+[[nodiscard]] std::shared_ptr<const OpticalEffect> sun_ghost(const Ghost& ghost);
+
+extern const OpticsKind kSunGhost;
 
 }  // namespace narpa

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "base/constants.h"
+#include "renderer/assets/point_spread_file.h"
 #include "renderer/detector/detector_stage.h"
+#include "renderer/optics/optical_effect.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
@@ -112,17 +114,6 @@ void refuse_tables_of_camera(TableReader& root) {
                         fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key->name));
 }
 
-/// Refuses thin lenses with a wide field: rays at right angles to the axis do not meet the plane of focus.
-void refuse_wide_field(TableReader& table, const Camera& camera) {
-    constexpr double kWidest_deg = 80;
-    const DirectionCone field = camera.model->bounds({-0.5, -0.5, camera.width - 0.5, camera.height - 0.5});
-    const double off_axis_deg = (std::acos(std::clamp(field.axis.z, -1.0, 1.0)) + field.half_angle_rad) * 180 / kPi;
-    if (off_axis_deg > kWidest_deg)
-        table.fail("lens", fmt::format("the image reaches {:.0f} degrees off the axis, expected at most {:g} for a "
-                                       "thin lens",
-                                       off_axis_deg, kWidest_deg));
-}
-
 Camera read_camera(TableReader& table, std::vector<std::string>& names, SceneReading& reading) {
     const Scene& scene = reading.scene;
     const std::filesystem::path& folder = reading.folder;
@@ -148,8 +139,16 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, SceneRea
     camera.detector = read_detector(table, camera.period_ns);
     camera.shutter = read_shutter(table, camera);
     camera.control = read_control(table, camera);
-    read_optics(table, camera, scene.sun.has_value(), folder, reading.scene.warnings);
-    if (camera.lens) refuse_wide_field(table, camera);
+    const auto read_image = [&](TableReader& optics, const std::string& key) -> std::shared_ptr<PointSpreadImage> {
+        auto image = read_point_spread_image((folder / *optics.text(key)).string(), &reading.scene.warnings);
+        if (image) return *image;
+        optics.fail(key, image.error().text());
+        return nullptr;
+    };
+    camera.optics = read_optics(table, {.plane = camera.plane(),
+                                        .detector = camera.detector ? &*camera.detector : nullptr,
+                                        .has_sun = scene.sun.has_value(),
+                                        .read_image = read_image});
     camera.white_radiance = table.number("white_radiance").value_or(white_radiance(scene));
     refuse_keys_of_detector(table);
     if (camera.detector) table.refuse("white_radiance", "belongs to cameras without a [camera.detector]");

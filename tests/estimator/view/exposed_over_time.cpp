@@ -120,7 +120,7 @@ protected:
         camera.shutter = Shutter{GetParam().row_ns};
         if (GetParam().distorts)
             camera.model = test::brown_conrady(test::pinhole_of(camera), {-0.35, 0.15, 1e-3, -8e-4, -0.03});
-        if (GetParam().blurs) camera.point_spread = PointSpreadFunction{.sigma_px = 0.8};
+        if (GetParam().blurs) camera.optics.point_spread = PointSpreadFunction{.sigma_px = 0.8};
     }
     /// A frame of a camera that moves as `velocity` and `rate`, world axes, have it.
     void take(std::uint32_t number) {

@@ -7,6 +7,8 @@
 
 #include "renderer/camera/scene_camera.h"
 #include "renderer/optics/image_optics.h"
+#include "renderer/optics/veiling_glare.h"
+#include "renderer/optics/vignetting.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/renderer/optics/point_spread_support.h"
 
@@ -62,7 +64,7 @@ double modulation(const RadianceImage& image, double f) {
 
 void expect_transfer(const std::optional<PointSpreadFunction>& spread) {
     Camera c = camera(129, 129, 100);
-    c.point_spread = spread;
+    c.optics.point_spread = spread;
     const RadianceImage image = slanted_edge(c);
     for (double f = 0.05; f < 0.46; f += 0.05) {
         const double pixel = sinc(f * std::cos(kSlant_rad)) * sinc(f * std::sin(kSlant_rad));
@@ -103,8 +105,8 @@ TEST(PointSpreadFunction, KeepsTheLightOfAPoint) {
     for (const PointSpreadFunction& spread :
          {PointSpreadFunction{.sigma_px = 0.8}, PointSpreadFunction{.sigma_px = 0.5, .cutoff_per_px = 0.7}}) {
         Camera c = camera(101, 101, 100);
-        c.point_spread = spread;
-        ImageOptics optics(c);
+        c.optics.point_spread = spread;
+        ImageOptics optics(c.optics, c.plane());
         RadianceImage in(101, 101), out(101, 101);
         in.pixels[50 * 101 + 40] = {1, 2, 3};
         optics.apply(in, out);
@@ -123,8 +125,8 @@ TEST(PointSpreadFunction, KeepsTheLightOfAPoint) {
 
 TEST(PointSpreadFunction, AFlatImageStaysFlatUpToItsBorder) {
     Camera c = camera(40, 30, 100);
-    c.point_spread = PointSpreadFunction{.sigma_px = 0.5, .cutoff_per_px = 0.7};
-    ImageOptics optics(c);
+    c.optics.point_spread = PointSpreadFunction{.sigma_px = 0.5, .cutoff_per_px = 0.7};
+    ImageOptics optics(c.optics, c.plane());
     RadianceImage in(40, 30), out(40, 30);
     std::ranges::fill(in.pixels, Rgb{2, 2, 2});
     optics.apply(in, out);
@@ -133,23 +135,23 @@ TEST(PointSpreadFunction, AFlatImageStaysFlatUpToItsBorder) {
 
 TEST(PointSpreadFunction, IsTheSameOnAnyNumberOfThreads) {
     Camera c = camera(65, 50, 100);
-    c.point_spread = PointSpreadFunction{.cutoff_per_px = 0.5};
-    c.veiling_glare = 0.1;
+    c.optics.point_spread = PointSpreadFunction{.cutoff_per_px = 0.5};
+    c.optics.effects = {veiling_glare(0.1)};
     RadianceImage in(65, 50), one(65, 50), many(65, 50);
     for (std::size_t i = 0; i < in.pixels.size(); i += 7) in.pixels[i] = {static_cast<float>(i), 1, 0};
-    ImageOptics optics(c);
+    ImageOptics optics(c.optics, c.plane());
     optics.apply(in, many);
-    optics.add_veiling_glare(many);
+    optics.add_effects({CameraPose{}}, many);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
     optics.apply(in, one);
-    optics.add_veiling_glare(one);
+    optics.add_effects({CameraPose{}}, one);
     EXPECT_EQ(one.pixels, many.pixels);
 }
 
 TEST(Vignetting, FallsWithCosFourAndThePolynomial) {
     Camera c = camera(160, 120, 80);
-    c.vignetting = Vignetting{.cos4 = true, .polynomial = {-0.1, 0.02, 0}};
-    ImageOptics optics(c);
+    c.optics.effects = {vignetting({.cos4 = true, .polynomial = {-0.1, 0.02, 0}})};
+    ImageOptics optics(c.optics, c.plane());
     RadianceImage in(160, 120), out(160, 120);
     std::ranges::fill(in.pixels, Rgb{1, 1, 1});
     optics.apply(in, out);
@@ -162,12 +164,12 @@ TEST(Vignetting, FallsWithCosFourAndThePolynomial) {
 
 TEST(VeilingGlare, SpreadsItsShareEvenly) {
     Camera c = camera(20, 10, 100);
-    c.veiling_glare = 0.05;
-    ImageOptics optics(c);
+    c.optics.effects = {veiling_glare(0.05)};
+    ImageOptics optics(c.optics, c.plane());
     RadianceImage in(20, 10), out(20, 10);
     in.pixels[33] = {100, 0, 0};
     optics.apply(in, out);
-    optics.add_veiling_glare(out);
+    optics.add_effects({CameraPose{}}, out);
     EXPECT_NEAR(out.pixels[0].x, 0.05 * 100 / 200, 1e-6);
     EXPECT_NEAR(out.pixels[33].x, 95 + 0.05 * 100 / 200, 1e-4);
 }

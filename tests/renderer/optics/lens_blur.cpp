@@ -37,7 +37,7 @@ TEST(ThinLens, StarsAreBlurredByTheApertureOverTheFocusDistance) {
 }
 
 Camera with_lens(Camera c, double aperture_m, double focus_m) {
-    c.lens = Lens{aperture_m, focus_m};
+    c.optics.lens = Lens{aperture_m, focus_m};
     return c;
 }
 
@@ -49,9 +49,9 @@ TEST(Lens, RaysOfAPixelMeetAtThePlaneOfFocus) {
         for (int i = 0; i < 100; ++i) {
             const Camera c = with_lens(camera(640, 480, 700), 0.05, focus);
             const double x = 640 * unit(random), y = 480 * unit(random);
-            const Vec3 from = aperture_point(*c.lens, unit(random), unit(random));
+            const Vec3 from = aperture_point(*c.optics.lens, unit(random), unit(random));
             EXPECT_LE(norm(from), 0.025);
-            const Ray pinhole = camera_ray(c, T, x, y), ray = lens_ray(c, *c.lens, T, x, y, from);
+            const Ray pinhole = camera_ray(c, T, x, y), ray = lens_ray(c, *c.optics.lens, T, x, y, from);
             EXPECT_NEAR(norm(ray.direction), 1, 1e-14);
             const Vec3 axis = T.q * Vec3{0, 0, 1};
             if (std::isinf(focus)) {
@@ -61,7 +61,7 @@ TEST(Lens, RaysOfAPixelMeetAtThePlaneOfFocus) {
                 const Vec3 q = ray.origin + focus / dot(ray.direction, axis) * ray.direction;
                 EXPECT_LE(norm(p - q), 1e-13 * (focus + 10));
             }
-            const Vec3 chief = chief_direction(*c.lens, conjugate(T.q) * ray.direction, from);
+            const Vec3 chief = chief_direction(*c.optics.lens, conjugate(T.q) * ray.direction, from);
             const auto [back_x, back_y] = *pinhole_of(c).project(chief);
             EXPECT_NEAR(back_x, x, 1e-9);
             EXPECT_NEAR(back_y, y, 1e-9);
@@ -90,7 +90,7 @@ TEST(Lens, AnEdgeOutOfFocusIsSpreadOverTheCircleOfConfusion) {
             const double wide = 100 * depth;
             add_mesh(s, plate(wide, wide), {{0, 1, 0, 0}, {wide / 2, 0, depth}});  // its edge on the axis
             const RadianceImage image = rendered(s, c, {}, {.spp = 1024});
-            const double blur = circle_of_confusion_px(*c.lens, pinhole_of(c).fx, depth);
+            const double blur = circle_of_confusion_px(*c.optics.lens, pinhole_of(c).fx, depth);
             EXPECT_GT(blur, 3);
             for (int x = 0; x < c.width; ++x) {
                 double expected = 0;  // the pixel is a window one wide
@@ -107,7 +107,7 @@ TEST(Lens, AFarPointIsADiscOfTheCircleOfConfusionAndKeepsItsLight) {
     // A shining ball 0.2 px wide, behind the plane of focus: its blur is 14 px wide.
     const double depth = 500, radius = 0.1 * depth / 700;
     const Camera c = with_lens(camera(41, 41, 700), 0.1, 4.9);
-    const double blur = circle_of_confusion_px(*c.lens, pinhole_of(c).fx, depth);
+    const double blur = circle_of_confusion_px(*c.optics.lens, pinhole_of(c).fx, depth);
     Scene s = emitting_ball();
     add_sphere(s, radius, {0.3 * depth / 700, -0.2 * depth / 700, depth});
     const RadianceImage image = rendered(s, c, {}, {.spp = 4});

@@ -92,10 +92,10 @@ TEST(PointSpreadImage, TransferOfAGaussianIsItsFormula) {
 Vec3 centroid_of_point(const PointSpreadFunction& spread) {
     constexpr int kSize = 81, kMiddle = 40;
     Camera c = camera(kSize, kSize, 100);
-    c.point_spread = spread;
+    c.optics.point_spread = spread;
     RadianceImage in(kSize, kSize), out(kSize, kSize);
     in.pixels[kMiddle * kSize + kMiddle] = {1, 1, 1};
-    ImageOptics(c).apply(in, out);
+    ImageOptics(c.optics, c.plane()).apply(in, out);
     Vec3 sum;
     for (int y = 0; y < kSize; ++y)
         for (int x = 0; x < kSize; ++x) {
@@ -195,7 +195,7 @@ TEST(PointSpreadImage, IsNamedRelativeToTheScene) {
         read_scene(folder.write("s.toml", kScene + std::string("psf = {image = \"coma.png\", samples_per_px = 2, "
                                                                "centre = [3, 4]}\n")));
     ASSERT_TRUE(scene) << scene.error().text();
-    const auto& spread = scene->cameras[0].point_spread;
+    const auto& spread = scene->cameras[0].optics.point_spread;
     ASSERT_TRUE(spread && spread->image);
     EXPECT_EQ(spread->samples_per_px, 2);
     EXPECT_EQ(spread->image->centre_x, 3);

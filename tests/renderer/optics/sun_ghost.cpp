@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "renderer/camera/scene_camera.h"
+#include "renderer/optics/sun_ghost.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/support/cameras.h"
 
@@ -24,9 +25,10 @@ Scene sun_at(double right, double below) {
     return scene;
 }
 
-Camera with_ghost(double radius_px = 20, double scale = 1) {
+Camera with_ghost(double radius_px = 20, double scale = 1, double strength = kStrength) {
     Camera c = camera(kGhostSide, kGhostSide, 300);
-    c.ghost = Ghost{.strength = kStrength, .radius_px = radius_px, .scale = scale, .within_rad = 0.5};
+    c.optics.effects = {
+        sun_ghost({.strength = strength, .radius_px = radius_px, .scale = scale, .within_rad = 0.5})};
     return c;
 }
 
@@ -63,33 +65,34 @@ TEST(SunGhost, IsEvenlyLit) {
     EXPECT_EQ(at(100 + 15, 100 + 15), 0);
 }
 
-void expect_opposite_the_sun(const Camera& c, double right, double below) {
+void expect_opposite_the_sun(const Camera& c, double scale, double right, double below) {
     const CameraModel& model = *c.model;
     const Scene scene = sun_at(right, below);
     const auto sun = model.project(scene.sun->direction), axis = model.project({0, 0, 1});
     ASSERT_TRUE(sun && axis);
     const Vec3 at = centroid_and_light(rendered(scene, c));
-    EXPECT_NEAR(at.x, axis->x - c.ghost->scale * (sun->x - axis->x), 0.01);
-    EXPECT_NEAR(at.y, axis->y - c.ghost->scale * (sun->y - axis->y), 0.01);
+    EXPECT_NEAR(at.x, axis->x - scale * (sun->x - axis->x), 0.01);
+    EXPECT_NEAR(at.y, axis->y - scale * (sun->y - axis->y), 0.01);
 }
 
 TEST(SunGhost, StandsOppositeTheSunsImage) {
-    Camera c = with_ghost();
-    set_principal_point(c, 91.3, 104);
-    expect_opposite_the_sun(c, 0.12, -0.07);
-    c.ghost->scale = 0.4;
-    expect_opposite_the_sun(c, 0.12, -0.07);
-    expect_opposite_the_sun(c, 0.45, 0.1);  // the Sun beyond the image
-    c.ghost->scale = -0.5;                  // on the Sun's side
-    expect_opposite_the_sun(c, 0.12, -0.07);
+    const auto expect = [](double scale, double right, double below) {
+        Camera c = with_ghost(20, scale);
+        set_principal_point(c, 91.3, 104);
+        expect_opposite_the_sun(c, scale, right, below);
+    };
+    expect(1, 0.12, -0.07);
+    expect(0.4, 0.12, -0.07);
+    expect(0.4, 0.45, 0.1);     // the Sun beyond the image
+    expect(-0.5, 0.12, -0.07);  // on the Sun's side
 }
 
 TEST(SunGhost, GoesWithTheDistortedImage) {
     Camera c = with_ghost(15, 0.8);
     c.model = brown_conrady(pinhole_of(c), {-0.3, 0.1, 0.01, -0.02});
-    expect_opposite_the_sun(c, 0.25, -0.2);
+    expect_opposite_the_sun(c, 0.8, 0.25, -0.2);
     c.model = kannala_brandt(pinhole_of(c), {0.1, -0.05, 0.02, 0});
-    expect_opposite_the_sun(c, 0.25, -0.2);
+    expect_opposite_the_sun(c, 0.8, 0.25, -0.2);
 }
 
 TEST(SunGhost, IsGoneBehindABodyAndBeyondItsAngle) {
@@ -133,7 +136,7 @@ TEST(SunGhost, LeavesTheImageBelowItAsItWas) {
     Scene scene = sun_at(0.1, 0);
     scene.bodies[0].initial.T_world_body.t = {0, 3, 30};
     Camera plain = with_ghost();
-    plain.ghost.reset();
+    plain.optics.effects.clear();
     const RadianceImage without = rendered(scene, plain), with = rendered(scene, with_ghost(200));
     const float added = with.pixels[0].y - without.pixels[0].y;
     EXPECT_GT(added, 0);
@@ -147,10 +150,9 @@ TEST(SunGhost, IsDimmedByTheAir) {
     Scene scene = sun_at(0, 0);
     scene.bodies.clear();
     add_sphere(scene, 6'371'000, -6'371'002 * Vec3{std::sin(z), 0, std::cos(z)});
-    Camera plain = with_ghost();
-    plain.ghost->strength = 1;
-    const Camera ghost = plain;
-    plain.ghost.reset();
+    const Camera ghost = with_ghost(20, 1, 1);
+    Camera plain = ghost;
+    plain.optics.effects.clear();
     const auto added = [&](const RenderScene& render_scene) {
         const std::size_t middle = kGhostSide * kGhostSide / 2 + kGhostSide / 2;
         const BodyPoses at = placed(scene);

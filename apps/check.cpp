@@ -153,7 +153,7 @@ nlohmann::json describe(const World& world) {
                            {"format", std::string(name(c.format))},
                            {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
                            {"detector", c.detector.has_value()},
-                           {"lens", c.lens.has_value()}});
+                           {"lens", c.optics.lens.has_value()}});
     for (const Lidar& l : s.lidars)
         lidars.push_back({{"name", l.name}, {"model", l.model->spec().name}, {"rate_hz", l.model->spec().rate_hz}});
     for (const Light& l : s.lights) lights.push_back({{"name", l.name}, {"kind", kind_name(l)}});
@@ -234,7 +234,7 @@ void print_scene(const World& world) {
     print_light(s);
     for (const Camera& c : s.cameras)
         say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height, name(c.format),
-                        1e9 / static_cast<double>(c.period_ns), c.lens ? ", with a lens" : ""));
+                        1e9 / static_cast<double>(c.period_ns), c.optics.lens ? ", with a lens" : ""));
     if (s.stars) {
         say(fmt::format("  stars: {}", s.stars->stars.size()));
         for (const Camera& c : s.cameras)

@@ -12,7 +12,7 @@
 #include "bench/statistics.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tracking/estimate_report.h"
 
 namespace narpa {
@@ -38,7 +38,7 @@ Camera without(const std::vector<std::string>& ignored, Camera camera) {
         if (what == "distortion") camera.model = std::make_shared<const Pinhole>(paraxial_pinhole(*camera.model));
         if (what == "rows" && camera.shutter) camera.shutter->row_time_ns = 0;
         if (what == "shutter") camera.shutter.reset();
-        if (what == "psf") camera.point_spread.reset();
+        if (what == "psf") camera.optics.point_spread.reset();
     }
     return camera;
 }

@@ -15,7 +15,7 @@
 #include "bench/statistics.h"
 #include "estimator/search/pose_search.h"
 #include "estimator/search/template_matcher.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tracking/estimate_report.h"
 
 namespace narpa {

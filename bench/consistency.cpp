@@ -14,7 +14,7 @@
 #include "estimator/search/cloud_search.h"
 #include "estimator/search/template_matcher.h"
 #include "protocols/lidar/velodyne.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "renderer/projection/brown_conrady.h"
 #include "tracking/estimate_report.h"
 
@@ -201,7 +201,8 @@ private:
         if (condition == "bright") camera.detector->exposure_s *= d.uniform(5, 40);
         if (condition == "dark") camera.detector->exposure_s /= d.uniform(5, 40);
         Camera exposing = camera;
-        if (condition == "blurred") exposing.point_spread = PointSpreadFunction{.sigma_px = d.uniform(0.5, 2)};
+        if (condition == "blurred")
+            exposing.optics.point_spread = PointSpreadFunction{.sigma_px = d.uniform(0.5, 2)};
         if (world.distortion != 0)
             exposing.model =
                 make_projection({&kBrownConrady, paraxial_pinhole(*camera.model), {world.distortion, 0, 0, 0}});

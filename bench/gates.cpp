@@ -6,7 +6,7 @@
 
 #include "base/time.h"
 #include "bench/statistics.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 
 namespace narpa {
 namespace {

@@ -6,7 +6,7 @@ set(NARPA_PUBLIC_HEADERS
   drivers/can/can_bus.h drivers/lidar/packet_sink.h drivers/lidar/packet_source.h drivers/video/video_sink.h
   drivers/video/video_source.h
   renderer/scene/scene.h renderer/scene_file/scene_file.h renderer/geometry/tracer.h renderer/frame/camera_image.h
-  renderer/camera/detector.h renderer/lidar/lidar_shot.h renderer/image/image_file.h
+  renderer/detector/detector.h renderer/lidar/lidar_shot.h renderer/image/image_file.h
   estimator/pose/pose_estimate.h estimator/filter/pose_filter.h
   emulator/emulator.h emulator/world.h tracking/online_estimator.h
   rehearsal/scenario/scenario.h)

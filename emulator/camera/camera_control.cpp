@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/camera/detector.h"
 #include "renderer/camera/read_out.h"
+#include "renderer/detector/detector.h"
 
 namespace narpa {
 namespace {

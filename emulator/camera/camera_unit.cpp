@@ -4,8 +4,8 @@
 
 #include "emulator/clock.h"
 #include "protocols/video/embedded_line.h"
-#include "renderer/camera/detector.h"
 #include "renderer/camera/read_out.h"
+#include "renderer/detector/detector.h"
 
 namespace narpa {
 

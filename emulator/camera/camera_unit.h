@@ -11,7 +11,7 @@
 #include "emulator/camera/camera_control.h"
 #include "emulator/world.h"
 #include "protocols/ledger.h"
-#include "renderer/camera/sensor_array.h"
+#include "renderer/detector/sensor_array.h"
 #include "renderer/frame/camera_image.h"
 
 namespace narpa {

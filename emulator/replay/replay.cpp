@@ -8,8 +8,8 @@
 #include "emulator/camera/camera_unit.h"
 #include "emulator/log/run_record.h"
 #include "protocols/video/embedded_line.h"
-#include "renderer/camera/detector.h"
 #include "renderer/camera/read_out.h"
+#include "renderer/detector/detector.h"
 #include "renderer/scene_file/scene_file.h"
 
 namespace narpa {

@@ -13,7 +13,7 @@
 #include "emulator/log/ledger_log.h"
 #include "emulator/replay/image_compare.h"
 #include "emulator/world.h"
-#include "renderer/camera/sensor_array.h"
+#include "renderer/detector/sensor_array.h"
 
 namespace narpa {
 

@@ -10,7 +10,7 @@ namespace {
 
 Camera finer_camera(const Camera& camera, int factor) {
     Camera c = scaled(camera, factor, factor);
-    c.lens.reset();
+    c.optics.lens.reset();
     return c;
 }
 

@@ -162,7 +162,7 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
 /// Theory 3, 1956).
 bool DenseAlignment::has_independent_noise() const {
     constexpr double kDithered = 3;  // half a step squared over rounding's variance, step^2 / 12
-    return !camera_.point_spread && !is_bayer(camera_.format) &&
+    return !camera_.optics.point_spread && !is_bayer(camera_.format) &&
            sensor_.read_dn2 >= kDithered * sensor_.rounding_dn2;
 }
 

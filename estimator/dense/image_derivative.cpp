@@ -107,7 +107,7 @@ ImageDerivative::ImageDerivative(const RenderScene& render_scene, const Camera& 
       camera_(camera),
       target_(target),
       at_(at),
-      optics_(camera),
+      optics_(camera.optics, camera.plane()),
       before_optics_(optics_.any() ? camera.width : 0, optics_.any() ? camera.height : 0),
       after_optics_(before_optics_) {
     const auto& materials = render_scene.scene().materials;

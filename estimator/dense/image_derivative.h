@@ -30,8 +30,8 @@
 #include "estimator/pose/pose_estimate.h"
 #include "estimator/view/measured_image.h"
 #include "estimator/view/row_times.h"
-#include "renderer/camera/image_optics.h"
 #include "renderer/frame/camera_image.h"
+#include "renderer/optics/image_optics.h"
 
 namespace narpa {
 

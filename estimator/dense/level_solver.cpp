@@ -55,8 +55,7 @@ LevelSolver::LevelSolver(const Camera& camera, const RenderScene& render_scene, 
                 .seed = options.seed,
                 .method = options.method,
                 .max_depth = options.max_depth},
-      choosing_(!coarse_ && !camera.point_spread && !(camera.veiling_glare > 0) &&
-                pixels_of(view.window()) >= kPixelsOfLargeTarget) {}
+      choosing_(!coarse_ && !camera.optics.spreads_light() && pixels_of(view.window()) >= kPixelsOfLargeTarget) {}
 
 DenseStatus LevelSolver::run(bool first) {
     view_.choose_all();

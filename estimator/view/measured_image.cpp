@@ -4,8 +4,9 @@
 #include <cmath>
 #include <string>
 
-#include "renderer/camera/detector.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/detector/detector.h"
+#include "renderer/detector/detector_stage.h"
 
 namespace narpa {
 namespace {
@@ -97,7 +98,8 @@ SensorModel sensor_model(const Camera& camera) {
         const auto i = static_cast<std::size_t>(b);
         s.dn_per_radiance[i] = weights[i] * electrons_per_radiance(d, b) * dn_per_e;
     }
-    const double dark_e = dark_electrons(d);
+    const SiteAmounts amounts = site_amounts(d);
+    const double dark_e = amounts.dark_e;
     s.black_dn = d.black_level_dn + dark_e * dn_per_e;
     s.rounding_dn2 *= camera.format == PixelFormat::rgb24 ? squares : 1;
     const double well_dn = d.black_level_dn + d.full_well_e * dn_per_e;
@@ -107,9 +109,10 @@ SensorModel sensor_model(const Camera& camera) {
         const double byte = std::exp2(converter_bits(camera) - 8);
         s.top_dn = std::floor(s.top_dn / byte) * byte + 0.5 * (byte - 1);
     }
-    const double dark_e2 = d.read_noise_e * d.read_noise_e + d.dsnu_e * d.dsnu_e + (d.shot_noise ? dark_e : 0);
+    const double dark_e2 =
+        d.read_noise_e * d.read_noise_e + amounts.dsnu_e * amounts.dsnu_e + (d.shot_noise ? dark_e : 0);
     s.read_dn2 = squares * dark_e2 * dn_per_e * dn_per_e;
-    s.prnu2 = squares * d.prnu * d.prnu;
+    s.prnu2 = squares * amounts.prnu * amounts.prnu;
     s.shot_dn = d.shot_noise ? squares * dn_per_e : 0;
     return s;
 }

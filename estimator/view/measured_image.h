@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "base/radiance_image.h"
 #include "base/result.h"
-#include "renderer/image/radiance_image.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {
@@ -28,7 +28,7 @@ struct MeasuredImage {
 };
 
 /// From radiance to digital numbers: DN = black + sum over bands of dn_per_radiance * L, clipped to 0 .. top, with
-/// the variance of read noise, shot noise and rounding. Of the camera's detector (renderer/camera/detector.h), or
+/// the variance of read noise, shot noise and rounding. Of the camera's detector (renderer/detector/detector.h), or
 /// of an ideal sensor without one. In DN of the converter, whatever bits of it the format keeps.
 struct SensorModel {
     std::array<double, 3> dn_per_radiance{};  ///< DN per W m^-2 sr^-1 in the red, green, blue band
@@ -51,7 +51,7 @@ struct SensorModel {
 /// modelled.
 [[nodiscard]] SensorModel sensor_model(const Camera& camera);
 
-/// A frame's bytes in the camera's format (renderer/camera/detector.h) as DN, with a mask of pixels that may be
+/// A frame's bytes in the camera's format (renderer/detector/detector.h) as DN, with a mask of pixels that may be
 /// clipped (YUYV: by luma). With an embedded line the image has one row fewer, as the last holds no light. Errors:
 /// the number of bytes is not the format's.
 [[nodiscard]] Result<MeasuredImage> measured_image(const Camera& camera, std::span<const std::uint8_t> bytes);

@@ -3,9 +3,9 @@
 
 #include <span>
 
+#include "base/camera_pose.h"
 #include "estimator/pnp/pnp_points.h"
 #include "estimator/pose/apparent_motion.h"
-#include "renderer/camera/camera_pose.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {

@@ -11,12 +11,7 @@ Camera scaled(const Camera& camera, double factor_x, double factor_y) {
     c.width = static_cast<int>(camera.width * factor_x * (1 + kRounding));
     c.height = static_cast<int>(camera.height * factor_y * (1 + kRounding));
     c.model = camera.model->scaled(factor_x, factor_y);
-    const double factor = std::sqrt(factor_x * factor_y);
-    if (c.ghost) c.ghost->radius_px *= factor;
-    if (c.point_spread) {
-        c.point_spread->sigma_px *= factor, c.point_spread->cutoff_per_px /= factor;
-        c.point_spread->samples_per_px /= factor;
-    }
+    c.optics = scaled(camera.optics, std::sqrt(factor_x * factor_y));
     return c;
 }
 

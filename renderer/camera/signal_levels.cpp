@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/pixel_format.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 
 namespace narpa {
 namespace {

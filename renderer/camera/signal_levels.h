@@ -1,7 +1,7 @@
 /// renderer/camera/signal_levels.h - how a frame's light fits the scale of the camera's digital numbers.
 #pragma once
 
-#include "renderer/image/radiance_image.h"
+#include "base/radiance_image.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {

@@ -8,9 +8,9 @@
 #include <span>
 
 #include "base/constants.h"
-#include "renderer/camera/lens.h"
-#include "renderer/camera/solar_bands.h"
+#include "renderer/detector/solar_bands.h"
 #include "renderer/geometry/flush_denormals.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa {
 namespace {
@@ -37,8 +37,8 @@ double blackbody(const SolarBand& band, double temperature_k) noexcept {
 
 /// Diameter of a star's image where the lens is not focused at infinity.
 double disc_px(const Camera& camera) noexcept {
-    return camera.lens
-               ? std::min(circle_of_confusion_px(*camera.lens, camera.model->pixels_per_radian(), kInfinity),
+    return camera.optics.lens
+               ? std::min(circle_of_confusion_px(*camera.optics.lens, camera.model->pixels_per_radian(), kInfinity),
                           kWidestDisc_px)
                : 0;
 }
@@ -88,8 +88,8 @@ StarLight::StarLight(const Scene& scene, const Camera& camera)
     : camera_(camera),
       field_(*scene.stars),
       model_(camera.model),
-      response_(camera.point_spread.value_or(PointSpreadFunction{}), disc_px(camera)),
-      points_per_px_(points_per_px(camera.point_spread.value_or(PointSpreadFunction{}))),
+      response_(camera.optics.point_spread.value_or(PointSpreadFunction{}), disc_px(camera)),
+      points_per_px_(points_per_px(camera.optics.point_spread.value_or(PointSpreadFunction{}))),
       moments_(kMaxSegments + 1),
       buffer_(kBuffer) {
     const double right = camera.width - 1, bottom = camera.height - 1, reach = response_.radius() + 1;

@@ -8,11 +8,11 @@
 
 #include <vector>
 
-#include "renderer/camera/camera_pose.h"
-#include "renderer/camera/image_optics.h"
-#include "renderer/camera/point_response.h"
+#include "base/camera_pose.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/light/medium.h"
+#include "renderer/optics/image_optics.h"
+#include "renderer/optics/point_response.h"
 
 namespace narpa {
 

@@ -5,16 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <optional>
 
 #include "base/constants.h"
-#include "renderer/camera/image_optics.h"
 #include "renderer/camera/star_light.h"
-#include "renderer/camera/sun_ghost.h"
 #include "renderer/frame/budgeted_frame.h"
 #include "renderer/frame/camera_rays.h"
 #include "renderer/frame/tuning.h"
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"
+#include "renderer/optics/image_optics.h"
 
 namespace narpa {
 namespace {
@@ -101,6 +101,22 @@ FrameAccount render_uniform(FramePasses& passes, const Frame& f, std::span<const
     return account;
 }
 
+/// Sunlight by one ray, through the scene's medium.
+class TracedSun final : public SunOnLens {
+public:
+    TracedSun(const Sun& sun, const RenderScene& scene, const BodyPoses& at)
+        : SunOnLens(sun.direction, sun.irradiance_w_m2), scene_(scene), at_(at) {}
+    [[nodiscard]] Rgb transmittance(const Vec3& point) const noexcept override {
+        const Ray ray{point, direction()};
+        if (scene_.tracer().intersect(at_, ray, kInfinity).body >= 0) return {};
+        return scene_.medium() == nullptr ? Rgb{1, 1, 1} : scene_.medium()->transmittance(at_, ray, kInfinity);
+    }
+
+private:
+    const RenderScene& scene_;
+    const BodyPoses& at_;
+};
+
 }  // namespace
 
 struct CameraRenderer::Impl {
@@ -110,13 +126,12 @@ struct CameraRenderer::Impl {
     FramePasses passes{render_scene.tracer(), camera};
     PassCosts costs{};
     std::vector<std::uint32_t> unseen = unseen_pixels(camera);
-    ImageOptics optics{camera};
+    ImageOptics optics{camera.optics, camera.plane()};
     /// Null where there are none.
     std::unique_ptr<StarLight> stars = with_stars && render_scene.scene().stars
                                            ? std::make_unique<StarLight>(render_scene.scene(), camera)
                                            : nullptr;
-    std::unique_ptr<const SunGhost> ghost = SunGhost::create(render_scene.scene(), camera);
-    bool after_light = optics.any() || stars || ghost;
+    bool after_light = optics.any() || stars;
     std::int64_t expected_ns = 0;  ///< wall time of a frame of FrameSettings::spp; 0: not known
     RadianceImage before_optics{after_light ? camera.width : 0, after_light ? camera.height : 0};
 
@@ -148,8 +163,10 @@ struct CameraRenderer::Impl {
     void apply_optics(const BodyPoses& at, const CameraPose& pose, RadianceImage& out) {
         optics.apply(before_optics, out);
         if (stars) stars->add(render_scene.tracer(), render_scene.medium(), at, pose, optics, out);
-        optics.add_veiling_glare(out);
-        if (ghost) ghost->add(render_scene.tracer(), render_scene.medium(), at, pose, out);
+        const std::optional<Sun>& sun = render_scene.scene().sun;
+        std::optional<TracedSun> traced;
+        if (sun) traced.emplace(*sun, render_scene, at);
+        optics.add_effects({pose, traced ? &*traced : nullptr}, out);
     }
 };
 

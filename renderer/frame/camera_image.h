@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "renderer/camera/camera_pose.h"
+#include "base/camera_pose.h"
+#include "base/radiance_image.h"
 #include "renderer/frame/frame_settings.h"
-#include "renderer/image/radiance_image.h"
 #include "renderer/light/render_scene.h"
 
 namespace narpa {

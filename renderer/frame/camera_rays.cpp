@@ -3,9 +3,9 @@
 #include <cassert>
 
 #include "base/each_isa.h"
-#include "renderer/camera/lens.h"
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/path_dimensions.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa {
 namespace {

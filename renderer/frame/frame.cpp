@@ -14,8 +14,8 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
     const Tracer& tracer = render_scene.tracer();
     const bool direct = settings.method == RenderSettings::Method::direct;
     // A single sample passes the lens at its centre, as through a pinhole.
-    const bool blurred = settings.spp > 1 && camera.lens && camera.lens->aperture_diameter_m > 0;
-    const Lens* const lens = blurred ? &*camera.lens : nullptr;
+    const bool blurred = settings.spp > 1 && camera.optics.lens && camera.optics.lens->aperture_diameter_m > 0;
+    const Lens* const lens = blurred ? &*camera.optics.lens : nullptr;
     const Mechanisms& on = settings.mechanisms;
     const bool over_time = pose.over_time() && (pose.moves() || at.moving());
     const CameraModel* const model = camera.model.get();

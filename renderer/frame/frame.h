@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "renderer/camera/camera_pose.h"
+#include "base/camera_pose.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/frame_settings.h"
 #include "renderer/frame/subpixel_bodies.h"

@@ -11,12 +11,12 @@
 #include <span>
 #include <vector>
 
+#include "base/radiance_image.h"
 #include "renderer/frame/frame_error.h"
 #include "renderer/frame/g_buffer.h"
 #include "renderer/frame/pixel_fill.h"
 #include "renderer/frame/sample_plan.h"
 #include "renderer/frame/tile_culling.h"
-#include "renderer/image/radiance_image.h"
 
 namespace narpa {
 

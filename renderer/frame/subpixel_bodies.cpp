@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/camera/lens.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa {
 namespace {
@@ -43,7 +43,7 @@ SubpixelBodies::SubpixelBodies(const Tracer& tracer, const BodyPoses& at, const 
       model_(model),
       T_world_camera_(T_world_camera),
       lens_(lens),
-      sample_reach_px_(camera.point_spread ? kSpreadSampleReach_px : 0.5) {
+      sample_reach_px_(camera.optics.point_spread ? kSpreadSampleReach_px : 0.5) {
     for (std::size_t body = 0; body < at.T_world_body.size() && !any_ && !moving; ++body)
         any_ = disc_within(static_cast<int>(body), 0, 0, camera.width - 1, camera.height - 1).has_value();
 }

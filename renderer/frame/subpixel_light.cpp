@@ -5,9 +5,9 @@
 #include <numbers>
 #include <optional>
 
-#include "renderer/camera/lens.h"
 #include "renderer/frame/pixel_samples.h"
 #include "renderer/integrator/sampler.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa {
 namespace {
@@ -137,7 +137,7 @@ void Collector::add(const SubpixelDisc& disc, std::uint32_t s, std::uint32_t sam
 }
 
 bool Collector::share_out(const ImagePoint& p, std::size_t i) {
-    const bool spread = f_.camera.point_spread.has_value();
+    const bool spread = f_.camera.optics.point_spread.has_value();
     bool any = false;
     for (std::size_t pixel = 0; pixel < block_.n; ++pixel) {
         columns_[i][pixel] = pixel_share(spread, block_.x[pixel] - p.x);

@@ -1,8 +1,8 @@
 /// renderer/frame/subpixel_light.h - adds the light of subpixel bodies to the image.
 #pragma once
 
+#include "base/radiance_image.h"
 #include "renderer/frame/frame.h"
-#include "renderer/image/radiance_image.h"
 
 namespace narpa {
 

@@ -26,7 +26,7 @@ void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, cons
         CulledBody culled{tracer_.bounds(body), boxes_[body], BodyView(at.T_world_body[body], T_world_camera),
                           kEmbreeSlack * tracer_.bounding_radius_m(body)};
         culled.slack_m += culled.view.rounding_m;
-        if (camera_.point_spread) {
+        if (camera_.optics.point_spread) {
             const auto& [c, r] = culled.bounds;
             const auto& [x, y, z] = culled.view.axes;
             culled.slack_m += spread_reach_m(model, culled.view.centre_camera + c.x * x + c.y * y + c.z * z,

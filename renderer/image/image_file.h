@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/radiance_image.h"
 #include "base/result.h"
-#include "renderer/image/radiance_image.h"
 #include "renderer/scene/scene.h"
 
 namespace cv {

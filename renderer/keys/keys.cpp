@@ -31,6 +31,9 @@ const TableKey* TableKeys::find(std::string_view name, int kind) const {
     if (const auto row = std::ranges::find(rows, name, &TableKey::name); row != rows.end()) return &*row;
     for (const TableKeys* part : parts)
         if (const TableKey* row = part ? part->find(name) : nullptr) return row;
+    if (listed)
+        for (const std::span<const TableKey> keys : listed())
+            if (const auto row = std::ranges::find(keys, name, &TableKey::name); row != keys.end()) return &*row;
     const std::vector<TableKind> all = kinds ? kinds() : std::vector<TableKind>{};
     for (std::size_t k = 0; k < all.size(); ++k)
         if (kind < 0 || kind == static_cast<int>(k))
@@ -44,6 +47,9 @@ std::vector<const TableKey*> TableKeys::all_rows() const {
     for (const TableKey& row : rows) all.push_back(&row);
     for (const TableKeys* part : parts)
         if (part) std::ranges::copy(part->all_rows(), std::back_inserter(all));
+    if (listed)
+        for (const std::span<const TableKey> keys : listed())
+            for (const TableKey& row : keys) all.push_back(&row);
     return all;
 }
 

@@ -84,10 +84,12 @@ struct TableKeys {
     std::span<const TableKey> rows{};
     std::array<const TableKeys*, 4> parts{};      ///< further keys of the same table; null: none
     std::vector<TableKind> (*kinds)() = nullptr;  ///< in the order of the concept's table
+    std::vector<std::span<const TableKey>> (*listed)() =
+        nullptr;  ///< further keys: of each row of a concept's table
 
     /// The row of a key of all kinds or of the kind with this index (-1: of any); null: it has none.
     [[nodiscard]] const TableKey* find(std::string_view name, int kind = -1) const;
-    /// The rows of all kinds, with those of the parts.
+    /// The rows of all kinds, with those of the parts and of the concept's table.
     [[nodiscard]] std::vector<const TableKey*> all_rows() const;
 };
 
@@ -109,6 +111,14 @@ std::vector<TableKind> kinds_of() {
     std::vector<TableKind> kinds;
     for (const auto* row : table()) kinds.push_back({row->name, row->keys});
     return kinds;
+}
+
+/// The keys of all rows of a concept's table, for tables that may have those of several rows at once.
+template <auto table>
+std::vector<std::span<const TableKey>> keys_of() {
+    std::vector<std::span<const TableKey>> keys;
+    for (const auto* row : table()) keys.push_back(row->keys);
+    return keys;
 }
 
 namespace rows {

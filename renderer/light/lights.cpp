@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/concentric_disc.h"
 #include "base/constants.h"
-#include "renderer/light/concentric_disc.h"
 #include "renderer/light/medium.h"
 
 namespace narpa {

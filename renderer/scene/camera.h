@@ -1,54 +1,20 @@
 /// renderer/scene/camera.h - a camera of a scene: its mount, projection, optics, detector and timing.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "base/pixel_format.h"
 #include "base/pose.h"
 #include "protocols/camera_control.h"
+#include "renderer/detector/detector_settings.h"
+#include "renderer/optics/optics.h"
 #include "renderer/projection/pinhole.h"
 #include "renderer/scene/course.h"
 
 namespace narpa {
-
-/// Photons to digital numbers. Absent: an ideal sensor without noise (see Camera::white_radiance). Amounts of 0 and
-/// switches that are false are exactly off.
-struct Detector {
-    double exposure_s = 0.01;  ///< exposure stops included
-    double pixel_pitch_m = 5e-6;
-    double f_number = 4;
-    double quantum_efficiency = 0.5;  ///< electrons per photon
-    double full_well_e = 20000;
-    double gain_e_per_dn = 0;  ///< 0: full_well_e / (2^bits - 1 - black_level_dn)
-    double read_noise_e = 0;   ///< RMS
-    bool shot_noise = false;   ///< Poisson
-    int black_level_dn = 0;
-    int bits = 12;  ///< ADC, 8..16
-
-    double dark_current_e_s = 0;  ///< mean of a pixel, at dark_reference_c
-    double temperature_c = 20, dark_reference_c = 20;
-    double dark_doubling_c = 7;  ///< temperature step, K, that doubles the dark current
-    double prnu = 0;             ///< relative standard deviation of the pixels' gains: EMVA's PRNU_1288
-    double dsnu_e = 0;           ///< standard deviation of the pixels' offsets: EMVA's DSNU_1288
-    double dead_pixel_share = 0;
-    double hot_pixel_share = 0, hot_pixel_e_s = 0;      ///< dark current added, at dark_reference_c
-    double blinking_pixel_share = 0, blinking_e_s = 0;  ///< the same, in half of the frames
-    bool blooming = false;
-    double cosmic_rays_per_cm2_s = 0;
-    double sensitive_depth_m = 1e-5;  ///< of the silicon that collects a cosmic ray's charge
-};
-
-/// Thin lens: a point off the focus distance, at depth z, is blurred to a circle of aperture * fx * |1/focus - 1/z|
-/// pixels.
-struct Lens {
-    double aperture_diameter_m = 0;
-    double focus_distance_m = 0;  ///< from the lens, along z; infinite is allowed
-};
 
 /// When the rows of an image are exposed. Without it every frame shows one instant, mid-exposure.
 struct Shutter {
@@ -65,40 +31,6 @@ struct CameraControlLimits {
     double level = 0.3;          ///< target of auto-exposure: mean of the image, share of full scale
 };
 
-/// Largest reach of the filter of a point spread function, pixels.
-inline constexpr int kPointSpreadReach_px = 31;
-
-/// Point spread function of a lens as samples that sum to 1, row by row.
-struct PointSpreadImage {
-    int width = 0, height = 0;
-    double centre_x = 0, centre_y = 0;  ///< where a pinhole images the point; the first sample is at (0, 0)
-    std::vector<double> samples;
-};
-
-/// The blur of the lens, the same all over the image; renderer/camera/point_spread.h.
-struct PointSpreadFunction {
-    double sigma_px = 0;       ///< of a Gaussian; 0: none
-    double cutoff_per_px = 0;  ///< diffraction: pixel pitch / (wavelength * f-number); 0: none
-    std::shared_ptr<const PointSpreadImage> image{};
-    double samples_per_px = 1;  ///< of the image
-};
-
-/// Lens ghost: an image of the aperture in the Sun's light, by two reflections in the lens;
-/// renderer/camera/sun_ghost.h.
-struct Ghost {
-    double strength = 0;  ///< share of the Sun's light that enters the aperture
-    double radius_px = 1;
-    double scale = 1;       ///< distance from the principal point over that of the Sun's image, on the other side
-    double within_rad = 0;  ///< angle of the Sun from the optical axis, below a right angle
-};
-
-/// The share of light at theta radians from the optical axis: cos^4 theta (if `cos4`) times 1 + a theta^2 + b
-/// theta^4 + c theta^6.
-struct Vignetting {
-    bool cos4 = false;
-    std::array<double, 3> polynomial{};  ///< a, b, c
-};
-
 enum class LatePolicy : std::uint8_t { drop, repeat, late, blank };
 
 struct Camera {
@@ -112,15 +44,17 @@ struct Camera {
     PixelFormat format = PixelFormat::grey;
     bool embedded_line = false;  ///< the last row carries the frame's identity and ledger
     LatePolicy late = LatePolicy::late;
-    double white_radiance = 0;  ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
-    std::optional<Detector> detector;
+    double white_radiance = 0;         ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
+    std::optional<Detector> detector;  ///< none: an ideal sensor without noise (see white_radiance)
     std::optional<Shutter> shutter{};
     std::optional<CameraControlLimits> control{};
-    std::optional<Lens> lens{};  ///< none: a pinhole
-    std::optional<PointSpreadFunction> point_spread{};
-    std::optional<Vignetting> vignetting{};
-    double veiling_glare = 0;  ///< share of the light that is spread evenly over the image
-    std::optional<Ghost> ghost{};
+    Optics optics{};
+
+    [[nodiscard]] ImagePlane plane() const { return {width, height, model}; }
+    /// Valid while the camera stays as it is.
+    operator ImageSensor() const noexcept {  // NOLINT(google-explicit-constructor)
+        return {name, width, height, format, white_radiance, detector ? &*detector : nullptr};
+    }
 };
 
 }  // namespace narpa

@@ -5,40 +5,15 @@
 #include <cmath>
 
 #include "base/constants.h"
+#include "renderer/assets/point_spread_file.h"
+#include "renderer/detector/detector_stage.h"
+#include "renderer/optics/optical_effect.h"
 #include "renderer/scene_file/scene_parts.h"
 
 namespace narpa {
 
 namespace {
 
-constexpr Range kCelsius{.low = -273.15, .high = 200}, kPixelShare{.low = 0, .high = 0.1};
-constexpr TableKey kDetectorRows[]{
-    {"exposure_s", rows::number(kPositive)},
-    {"exposure_stops", rows::number({.low = -20, .high = 20})},
-    {"pixel_pitch_m", rows::number(kPositive)},
-    {"f_number", rows::number(kPositive)},
-    {"quantum_efficiency", rows::number({.low = 0, .high = 1, .low_open = true})},
-    {"full_well_e", rows::number({.low = 1})},
-    {"gain_e_per_dn", rows::number(kNotNegative)},
-    {"read_noise_e", rows::number(kNotNegative)},
-    {"shot_noise", rows::boolean()},
-    {"black_level_dn", rows::integer(0, (1 << 16) - 2)},  // `bits` narrows it
-    {"bits", rows::integer(8, 16)},
-    {"dark_current_e_s", rows::number(kNotNegative)},
-    {"temperature_c", rows::number(kCelsius)},
-    {"dark_reference_c", rows::number(kCelsius)},
-    {"dark_doubling_c", rows::number({.low = 1, .high = 100})},
-    {"prnu", rows::number({.low = 0, .high = 0.5})},
-    {"dsnu_e", rows::number(kNotNegative)},
-    {"dead_pixel_share", rows::number(kPixelShare)},
-    {"hot_pixel_share", rows::number(kPixelShare)},
-    {"hot_pixel_e_s", rows::number(kPositive)},
-    {"blinking_pixel_share", rows::number(kPixelShare)},
-    {"blinking_e_s", rows::number(kPositive)},
-    {"blooming", rows::boolean()},
-    {"cosmic_rays_per_cm2_s", rows::number({.low = 0, .high = 1e6})},
-    {"sensitive_depth_m", rows::number({.low = 0, .high = 0.01, .low_open = true})},
-};
 constexpr TableKey kShutterRows[]{{"kind", rows::kind(), "\"global\" or \"rolling\""}};
 constexpr TableKey kRollingRows[]{
     {"row_time_s", rows::number(kPositive), "the time from one row's start to the next one's"}};
@@ -53,7 +28,7 @@ constexpr TableKey kControlRows[]{
     {"auto_exposure", rows::boolean()},
     {"auto_exposure_level", rows::number({.low = 0.01, .high = 0.9})},
 };
-constexpr TableKeys kDetectorKeys{.rows = kDetectorRows}, kControlKeys{.rows = kControlRows};
+constexpr TableKeys kControlKeys{.rows = kControlRows};
 constexpr TableKeys kShutterKeys{.rows = kShutterRows, .kinds = [] {
                                      return std::vector<TableKind>{{"global"}, {"rolling", kRollingRows}};
                                  }};
@@ -68,57 +43,6 @@ constexpr TableKey kCameraRows[]{
     {"shutter", rows::table(kShutterKeys)},
     {"control", rows::table(kControlKeys)},
 };
-
-/// A share of the pixels and the current of each, which belong together.
-void read_defects(TableReader& table, const char* share_key, const char* current_key, double& share,
-                  double& current_e_s) {
-    table.read(share_key, share);
-    if (share > 0) table.require(current_key, "a number > 0, as there is such a share of pixels");
-    if (!table.has(share_key)) table.refuse(current_key, fmt::format("there is no {}", share_key));
-    table.read(current_key, current_e_s);
-}
-
-/// Dark current, and what makes pixels differ from each other.
-void read_sensor_array(TableReader& table, Detector& d) {
-    table.read("dark_current_e_s", d.dark_current_e_s);
-    table.read("dark_reference_c", d.dark_reference_c);
-    d.temperature_c = table.number("temperature_c").value_or(d.dark_reference_c);
-    table.read("dark_doubling_c", d.dark_doubling_c);
-    table.read("prnu", d.prnu);
-    table.read("dsnu_e", d.dsnu_e);
-    table.read("dead_pixel_share", d.dead_pixel_share);
-    read_defects(table, "hot_pixel_share", "hot_pixel_e_s", d.hot_pixel_share, d.hot_pixel_e_s);
-    read_defects(table, "blinking_pixel_share", "blinking_e_s", d.blinking_pixel_share, d.blinking_e_s);
-    table.read("blooming", d.blooming);
-    table.read("cosmic_rays_per_cm2_s", d.cosmic_rays_per_cm2_s);
-    table.read("sensitive_depth_m", d.sensitive_depth_m);
-}
-
-std::optional<Detector> read_detector(TableReader& camera, std::int64_t period_ns) {
-    auto table = camera.table("detector");
-    if (!table) return std::nullopt;
-    Detector d;
-    table->read("exposure_s", d.exposure_s);
-    table->read("pixel_pitch_m", d.pixel_pitch_m);
-    table->read("f_number", d.f_number);
-    table->read("quantum_efficiency", d.quantum_efficiency);
-    table->read("full_well_e", d.full_well_e);
-    table->read("gain_e_per_dn", d.gain_e_per_dn);
-    table->read("read_noise_e", d.read_noise_e);
-    table->read("shot_noise", d.shot_noise);
-    table->read("bits", d.bits);
-    d.black_level_dn = static_cast<int>(table->integer("black_level_dn", 0, (1 << d.bits) - 2).value_or(0));
-    read_sensor_array(*table, d);
-    d.exposure_s *= std::exp2(table->number("exposure_stops").value_or(0));
-    const double period_s = 1e-9 * static_cast<double>(period_ns);
-    if (d.exposure_s > period_s) {
-        const std::string what = fmt::format("{} s is longer than a frame, expected at most 1 / rate_hz = {:g} s",
-                                             d.exposure_s, period_s);
-        table->fail("exposure_s", what);
-    }
-    table->finish();
-    return d;
-}
 
 /// From the start of the first row's exposure to that of the last one's.
 double rows_s(const Camera& c, const std::optional<Shutter>& shutter) {
@@ -178,8 +102,8 @@ double white_radiance(const Scene& scene) {
 
 /// Refuses keys of the detector in [[camera]], a likely mistake.
 void refuse_keys_of_detector(TableReader& camera) {
-    for (const TableKey& key : kDetectorRows)
-        camera.refuse(key.name, "belongs to the camera's detector, expected it in [camera.detector]");
+    for (const TableKey* key : kDetectorKeys.all_rows())
+        camera.refuse(key->name, "belongs to the camera's detector, expected it in [camera.detector]");
 }
 
 /// Refuses tables of a camera at the top level.
@@ -188,17 +112,6 @@ void refuse_tables_of_camera(TableReader& root) {
         if (key->value.type == KeyValue::Type::table)
             root.refuse(key->name,
                         fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key->name));
-}
-
-/// Refuses thin lenses with a wide field: rays at right angles to the axis do not meet the plane of focus.
-void refuse_wide_field(TableReader& table, const Camera& camera) {
-    constexpr double kWidest_deg = 80;
-    const DirectionCone field = camera.model->bounds({-0.5, -0.5, camera.width - 0.5, camera.height - 0.5});
-    const double off_axis_deg = (std::acos(std::clamp(field.axis.z, -1.0, 1.0)) + field.half_angle_rad) * 180 / kPi;
-    if (off_axis_deg > kWidest_deg)
-        table.fail("lens", fmt::format("the image reaches {:.0f} degrees off the axis, expected at most {:g} for a "
-                                       "thin lens",
-                                       off_axis_deg, kWidest_deg));
 }
 
 Camera read_camera(TableReader& table, std::vector<std::string>& names, SceneReading& reading) {
@@ -226,8 +139,16 @@ Camera read_camera(TableReader& table, std::vector<std::string>& names, SceneRea
     camera.detector = read_detector(table, camera.period_ns);
     camera.shutter = read_shutter(table, camera);
     camera.control = read_control(table, camera);
-    read_optics(table, camera, scene.sun.has_value(), folder, reading.scene.warnings);
-    if (camera.lens) refuse_wide_field(table, camera);
+    const auto read_image = [&](TableReader& optics, const std::string& key) -> std::shared_ptr<PointSpreadImage> {
+        auto image = read_point_spread_image((folder / *optics.text(key)).string(), &reading.scene.warnings);
+        if (image) return *image;
+        optics.fail(key, image.error().text());
+        return nullptr;
+    };
+    camera.optics = read_optics(table, {.plane = camera.plane(),
+                                        .detector = camera.detector ? &*camera.detector : nullptr,
+                                        .has_sun = scene.sun.has_value(),
+                                        .read_image = read_image});
     camera.white_radiance = table.number("white_radiance").value_or(white_radiance(scene));
     refuse_keys_of_detector(table);
     if (camera.detector) table.refuse("white_radiance", "belongs to cameras without a [camera.detector]");

@@ -59,8 +59,8 @@ extern const TableKeys kSceneKeys, kSunKeys, kAmbientKeys, kStarsKeys, kRenderKe
     kLightKeys, kCameraKeys, kLidarKeys, kAtmosphereKeys;
 extern const TableKeys kMaterialKeys, kDemKeys;  ///< of `material` and `dem` of a body
 extern const TableKeys kOrbitKeys;               ///< of `orbit` of a body
-/// Parts of the keys of cameras: those at the observer, size and projection, optics.
-extern const TableKeys kTrackingKeys, kProjectionKeys, kOpticsKeys;
+/// Parts of the keys of cameras: those at the observer, size and projection.
+extern const TableKeys kTrackingKeys, kProjectionKeys;
 /// [scene], [sun], [ambient], [render].
 void read_surroundings(TableReader& root, SceneReading& reading);
 /// [stars], with its catalogue. `epoch_year`: that of [scene], if it has one.
@@ -74,9 +74,6 @@ void read_sensors(TableReader& root, SceneReading& reading);
 /// Resolution and projection of a camera; paths in it start at `folder`.
 void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder,
                      std::vector<std::string>& warnings);
-/// Lens, point spread, vignetting, glare and ghost of a camera, after its detector; paths start at `folder`.
-void read_optics(TableReader& camera_table, Camera& camera, bool has_sun, const std::filesystem::path& folder,
-                 std::vector<std::string>& warnings);
 /// A [[lidar]]; paths start at `folder`.
 Lidar read_lidar(TableReader& table, std::vector<std::string>& names, Scene& scene,
                  const std::filesystem::path& folder);

@@ -11,7 +11,7 @@
 #include "bench/consistency_scenes.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/support/campaign.h"
 #include "tests/support/paths.h"
 

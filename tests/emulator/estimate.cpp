@@ -103,7 +103,7 @@ TEST_F(EstimateTest, KnowsTheShutterAndTheLens) {
     Camera& c = s.cameras[0];
     c.shutter = Shutter{200'000};  // 48 ms from the first row to the last
     c.model = test::brown_conrady(test::pinhole_of(c), {-0.3, 0.1, 1e-3, -8e-4});
-    c.point_spread = PointSpreadFunction{.sigma_px = 0.7};
+    c.optics.point_spread = PointSpreadFunction{.sigma_px = 0.7};
     Motion& chaser = s.bodies[1].initial;
     chaser.T_world_body.t = {14, 0.4, -0.3};
     chaser.velocity_m_s = {-0.1, 100.02, 0.01};

@@ -147,7 +147,7 @@ TEST_F(ErosFrame, FitsARenderAtThePublishedPose) {
     Camera& camera = scene.cameras[0];
     camera.detector.reset();
     camera.white_radiance = full_scale_if * scene.sun->irradiance_w_m2 / std::numbers::pi;
-    camera.point_spread = PointSpreadFunction{.sigma_px = 4};
+    camera.optics.point_spread = PointSpreadFunction{.sigma_px = 4};
     const auto compared = [&](float albedo) {
         rock.diffuse = {albedo, albedo, albedo};
         const RenderScene real = *RenderScene::create(scene);

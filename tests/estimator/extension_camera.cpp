@@ -10,7 +10,7 @@
 #include "estimator/pnp/pnp_refine.h"
 #include "estimator/stereo/stereo_matcher.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/estimator/pnp/pnp_ceres.h"
 #include "tests/support/cameras.h"
 #include "tests/support/equidistant_camera.h"

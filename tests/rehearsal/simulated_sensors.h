@@ -5,7 +5,7 @@
 #include "estimator/view/model_view.h"
 #include "protocols/lidar/lidar_model.h"
 #include "rehearsal/navigation/estimation/scene_model.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "tests/rehearsal/navigation_plant.h"
 

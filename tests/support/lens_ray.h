@@ -1,7 +1,8 @@
 /// tests/support/lens_ray.h - one ray of a camera with a lens.
 #pragma once
 
-#include "renderer/camera/lens.h"
+#include "renderer/camera/scene_camera.h"
+#include "renderer/optics/lens.h"
 
 namespace narpa::test {
 

@@ -10,7 +10,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/dense/level_view.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 

@@ -9,7 +9,7 @@
 
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "renderer/geometry/ellipsoid.h"
 #include "tests/support/cameras.h"
 

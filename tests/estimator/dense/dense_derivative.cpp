@@ -152,7 +152,7 @@ TEST(ImageDerivative, OfARollingShutterAndABlurringLens) {
     const auto render_scene = RenderScene::create(scene);
     ASSERT_TRUE(render_scene);
     Camera camera = pinhole(48, 150);
-    camera.point_spread = PointSpreadFunction{.sigma_px = 0.8};
+    camera.optics.point_spread = PointSpreadFunction{.sigma_px = 0.8};
     Renders r;
     r.half_rad = 1.6e-2, r.half_m = r.half_ahead_m = 3.2e-2;
     r.motion = {{0.6, 0.3, -0.5}, {0.1, 0.2, 0.1}};

@@ -8,7 +8,7 @@
 #include "base/constants.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/support/cameras.h"
 #include "tests/support/paths.h"

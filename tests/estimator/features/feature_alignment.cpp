@@ -6,7 +6,7 @@
 #include "base/constants.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/features/feature_matcher.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/support/paths.h"
 

@@ -15,7 +15,7 @@
 #include "base/constants.h"
 #include "estimator/search/attitude_grid.h"
 #include "estimator/view/model_view.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/support/cameras.h"
 
 namespace narpa {

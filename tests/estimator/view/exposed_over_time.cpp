@@ -8,7 +8,7 @@
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
 #include "estimator/pnp/pnp.h"
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/estimator/pnp/pnp_support.h"
 #include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
@@ -120,7 +120,7 @@ protected:
         camera.shutter = Shutter{GetParam().row_ns};
         if (GetParam().distorts)
             camera.model = test::brown_conrady(test::pinhole_of(camera), {-0.35, 0.15, 1e-3, -8e-4, -0.03});
-        if (GetParam().blurs) camera.point_spread = PointSpreadFunction{.sigma_px = 0.8};
+        if (GetParam().blurs) camera.optics.point_spread = PointSpreadFunction{.sigma_px = 0.8};
     }
     /// A frame of a camera that moves as `velocity` and `rate`, world axes, have it.
     void take(std::uint32_t number) {

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/camera/detector.h"
+#include "renderer/detector/dark_current.h"
+#include "renderer/detector/detector.h"
+#include "renderer/detector/nonuniformity.h"
 #include "tests/support/cameras.h"
 
 namespace narpa {
@@ -109,9 +111,7 @@ TEST_P(EveryFormat, ExpectedSignalIsThatOfAFrameWithoutNoise) {
 
 TEST(MeasuredImage, NoiseModelHasDarkCurrentPrnuAndDsnu) {
     Camera camera = camera_with(PixelFormat::y16, true);
-    camera.detector->dark_current_e_s = 4e8;  // 8000 e-
-    camera.detector->prnu = 0.03;
-    camera.detector->dsnu_e = 80;
+    camera.detector->stages = {dark_current(4e8), nonuniformity({.prnu = 0.03, .dsnu_e = 80})};  // 8000 e-
     const SensorModel model = sensor_model(camera);
     for (const float level : {0.f, 60.f, 120.f}) {
         const Rgb light{level, level, level};

@@ -26,7 +26,9 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     for (const Camera& c : scene->cameras) {
         fuzz::require(c.mount < bodies && is_unit(c.T_mount_camera.q), "a camera is mounted");
         fuzz::require(c.model && c.model->is_valid() && c.period_ns > 0, "a camera has a field of view");
-        fuzz::require(!c.lens || (c.lens->aperture_diameter_m > 0 && c.lens->focus_distance_m > 0), "a lens");
+        fuzz::require(
+            !c.optics.lens || (c.optics.lens->aperture_diameter_m > 0 && c.optics.lens->focus_distance_m > 0),
+            "a lens");
     }
     for (const Body& b : scene->bodies) fuzz::require(is_unit(b.initial.T_world_body.q), "an attitude is unit");
     if (scene->sun) fuzz::require(std::abs(norm(scene->sun->direction) - 1) < 1e-12, "the Sun's direction is unit");

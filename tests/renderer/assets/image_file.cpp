@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
 #include "tests/support/image_files.h"
 #include "tests/support/paths.h"
 #include "tests/support/read_file.h"

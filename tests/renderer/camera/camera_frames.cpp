@@ -3,8 +3,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "renderer/camera/detector.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/detector/detector.h"
 #include "renderer/frame/camera_image.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/cameras.h"

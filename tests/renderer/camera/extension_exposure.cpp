@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/camera/camera_pose.h"
+#include "base/camera_pose.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/support/cameras.h"
 

@@ -3,7 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/renderer/camera/detector_support.h"
+#include "renderer/detector/dark_current.h"
+#include "tests/renderer/detector/detector_support.h"
 
 namespace narpa::test {
 namespace {
@@ -97,14 +98,15 @@ TEST(SignalLevels, CountOnlyPixelsWithLight) {
 
 TEST(SignalLevels, DarkCurrentSaturatesToo) {
     Camera c = camera_of(PixelFormat::y16, 0);
-    c.detector->dark_current_e_s = 0.4 * c.detector->full_well_e / c.detector->exposure_s;
+    const double dark_e_s = 0.4 * c.detector->full_well_e / c.detector->exposure_s;
+    c.detector->stages = {dark_current(dark_e_s)};
     const double scale = 1 / signal_levels(c, even(c, 1)).brightest;
     const auto levels = [&](double level) { return signal_levels(c, even(c, static_cast<float>(level * scale))); };
     EXPECT_NEAR(levels(0).dark, 0.4, 1e-12);
     EXPECT_EQ(levels(0.55).saturated_share, 0);
     EXPECT_EQ(levels(0.65).saturated_share, 1);
     EXPECT_FALSE(levels(0.1).is_filled_by_dark_current());
-    c.detector->dark_current_e_s *= 2;
+    c.detector->stages = {dark_current(2 * dark_e_s)};
     EXPECT_TRUE(levels(0).is_filled_by_dark_current());
 }
 

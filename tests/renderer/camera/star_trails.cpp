@@ -10,7 +10,7 @@ constexpr double kTrailFocal_px = 1000;
 
 Camera trail_camera(const std::optional<PointSpreadFunction>& spread) {
     Camera c = camera(121, 61, kTrailFocal_px);
-    c.point_spread = spread;
+    c.optics.point_spread = spread;
     return c;
 }
 

@@ -1,7 +1,9 @@
 // Stars in the image: where they stand, how much light they give, what hides them.
 #include <tbb/global_control.h>
 
-#include "renderer/camera/detector.h"
+#include "renderer/detector/detector.h"
+#include "renderer/optics/veiling_glare.h"
+#include "renderer/optics/vignetting.h"
 #include "tests/renderer/camera/star_support.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/cameras.h"
@@ -21,7 +23,7 @@ TEST(Stars, CentroidsAreWithinAHundredthOfAPixel) {
     std::uniform_real_distribution<double> offset(-0.5, 0.5);
     for (const PointSpreadFunction& spread : {kGaussian, kAiry, kBoth}) {
         Camera c = camera(101, 101, 2000);
-        c.point_spread = spread;
+        c.optics.point_spread = spread;
         const Scene scene = sky({{0, 0, 1}});
         auto render_scene = RenderScene::create(scene, 1);
         ASSERT_TRUE(render_scene);
@@ -63,13 +65,13 @@ TEST(Stars, ElectronsAreThoseThatTheApertureCollects) {
     }
     for (const auto& spread :
          {std::optional<PointSpreadFunction>{}, std::optional(kGaussian), std::optional(kAiry)}) {
-        c.point_spread = spread;
+        c.optics.point_spread = spread;
         EXPECT_NEAR(electrons_in(rendered(sky({{0.0003, -0.0002, 1}}, 3), c), *c.detector) / wanted, 1, 0.005);
     }
     // Off the axis the aperture is seen from the side: with cos^4 the light falls with the cosine, as it should.
     set_pinhole(c, 100, 100, pinhole_of(c).cx, pinhole_of(c).cy);
-    c.vignetting = Vignetting{.cos4 = true};
-    c.point_spread = kGaussian;
+    c.optics.effects = {vignetting({.cos4 = true})};
+    c.optics.point_spread = kGaussian;
     EXPECT_NEAR(electrons_in(rendered(sky({{0.6, 0.4, 1}}, 3), c), *c.detector) /
                     (wanted / 100 / std::sqrt(1 + 0.36 + 0.16)),
                 1, 0.005);
@@ -87,7 +89,7 @@ TEST(Stars, MagnitudesAndColours) {
 TEST(Stars, KeepTheirLightInEveryCamera) {
     const Vec3 direction = normalized(Vec3{0.5, -0.3, 1});
     Camera c = camera(240, 200, 120);
-    c.point_spread = kGaussian;
+    c.optics.point_spread = kGaussian;
     const Pinhole pinhole = pinhole_of(c);
     for (const auto& projection : {c.model, brown_conrady(pinhole, {-0.2, 0.05, 1e-3, -1e-3}),
                                    kannala_brandt(pinhole, {0.02, -0.01, 0, 0})}) {
@@ -110,7 +112,7 @@ TEST(Stars, StayInOnePixelWithoutAPointSpread) {
 
 TEST(Stars, AreDiscsWhereTheLensIsFocusedNearby) {
     Camera c = camera(61, 61, 1000);
-    c.lens = Lens{.aperture_diameter_m = 0.04, .focus_distance_m = 2};  // discs of 20 px
+    c.optics.lens = Lens{.aperture_diameter_m = 0.04, .focus_distance_m = 2};  // discs of 20 px
     const Vec3 direction = {0.0002, 0.0003, 1};
     const RadianceImage image = rendered(sky({direction}), c);
     const Spot spot = spot_in(image);
@@ -123,7 +125,7 @@ TEST(Stars, AreDiscsWhereTheLensIsFocusedNearby) {
             if (std::abs(r - 10) < 1) continue;
             EXPECT_NEAR(v * kPi * 100, r < 10 ? 1 : 0, 0.02) << x << ", " << y;
         }
-    c.lens->focus_distance_m = kInfinity;
+    c.optics.lens->focus_distance_m = kInfinity;
     EXPECT_LT(static_cast<double>(rendered(sky({direction}), c).pixels[29 * 61 + 30].y), 0.005 * spot.sum);
 }
 
@@ -132,7 +134,7 @@ TEST(Stars, FollowAPointSpreadThatIsAnImage) {
     *image = {.width = 6, .height = 4, .centre_x = 1, .centre_y = 2, .samples = std::vector<double>(24)};
     image->samples[2 * 6 + 1] = 0.75, image->samples[0 * 6 + 5] = 0.25;  // in the centre; 2 px right and 1 px above
     Camera c = camera(61, 61, 1000);
-    c.point_spread = PointSpreadFunction{.sigma_px = 0.6, .image = image, .samples_per_px = 2};
+    c.optics.point_spread = PointSpreadFunction{.sigma_px = 0.6, .image = image, .samples_per_px = 2};
     for (const double x : {0.0, 0.0003, -0.0004}) {
         const Spot spot = spot_in(rendered(sky({{x, 0.0002, 1}}), c));
         EXPECT_NEAR(spot.x, 30 + 1000 * x + 0.25 * 2, 0.01);
@@ -142,7 +144,7 @@ TEST(Stars, FollowAPointSpreadThatIsAnImage) {
 
 TEST(Stars, BesideTheImageGiveItTheEdgeOfTheirSpot) {
     Camera c = camera(21, 21, 1000);
-    c.point_spread = PointSpreadFunction{.sigma_px = 1};
+    c.optics.point_spread = PointSpreadFunction{.sigma_px = 1};
     const Spot whole = spot_in(rendered(sky({{0, 0, 1}}), c));
     const Spot half = spot_in(rendered(sky({{-0.0105, 0, 1}}), c));  // on the outer border of the first column
     EXPECT_NEAR(half.sum / whole.sum, 0.5, 0.005);
@@ -152,7 +154,7 @@ TEST(Stars, BesideTheImageGiveItTheEdgeOfTheirSpot) {
 TEST(Stars, VeilingGlareSpreadsTheirLightToo) {
     Camera c = camera(21, 21, 1000);
     const double sum = spot_in(rendered(sky({{0, 0, 1}}), c)).sum;
-    c.veiling_glare = 0.1;
+    c.optics.effects = {veiling_glare(0.1)};
     const RadianceImage image = rendered(sky({{0, 0, 1}}), c);
     EXPECT_NEAR(static_cast<double>(image.pixels[0].y), 0.1 * sum / (21 * 21), 1e-6 * sum);
 }
@@ -162,7 +164,7 @@ TEST(Stars, BodiesHideThem) {
     scene.materials.push_back(lambert(0.5f));
     add_sphere(scene, 1, {2, 0, 100});  // of 10 px, black without a Sun, before the second
     Camera c = camera(101, 101, 1000);
-    c.point_spread = kGaussian;
+    c.optics.point_spread = kGaussian;
     const Spot spot = spot_in(rendered(scene, c));
     EXPECT_NEAR(spot.x, 30, 0.01);
     scene.bodies.clear();
@@ -177,7 +179,7 @@ TEST(Stars, AirDimsThem) {
         scene.materials.push_back(lambert(0.3f));
         add_sphere(scene, 6'371'000, -6'371'002 * Vec3{std::sin(z), 0, std::cos(z)});
         Camera c = camera(21, 21, 1000);
-        c.point_spread = kGaussian;
+        c.optics.point_spread = kGaussian;
         const RadianceImage vacuum = rendered(scene, c);
         scene.atmosphere = coarse_earth_air();
         const auto render_scene = RenderScene::create(scene, 2);
@@ -208,7 +210,7 @@ TEST(Stars, AreDisplacedByTheVelocityOfTheObserver) {
         }
     // In the image: 100,000 px per radian, by the world's velocity and the camera's own.
     Camera c = camera(101, 101, 1e5);
-    c.point_spread = kGaussian;
+    c.optics.point_spread = kGaussian;
     Scene scene = sky({{0, 0, 1}});
     scene.stars->velocity_m_s = {29790, 0, 0};
     CameraPose pose;
@@ -220,7 +222,7 @@ TEST(Stars, AreDisplacedByTheVelocityOfTheObserver) {
 
 TEST(Stars, TurnWithTheWorldFrame) {
     Camera c = camera(101, 101, 1000);
-    c.point_spread = kGaussian;
+    c.optics.point_spread = kGaussian;
     Scene scene = sky({{1, 0, 0}});
     scene.stars->q_icrs_world = exp_rotation({0, kPi / 2, 0});  // the world's z is ICRS's x
     EXPECT_NEAR(spot_in(rendered(scene, c)).x, 50, 0.01);
@@ -239,7 +241,7 @@ TEST(Stars, AreTheSameOnAnyNumberOfThreadsAndAllocateNothing) {
     add_sphere(scene, 10, {5, 0, 100});
     add_sun(scene, {-1, 0, -1});
     Camera c = camera(160, 120, 100);
-    c.point_spread = kBoth;
+    c.optics.point_spread = kBoth;
     const CameraPose pose = turning({0.02, 0.05, 0.1}, 0.5 / 119);
     const RadianceImage all = rendered(scene, c, pose);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);

@@ -1,9 +1,9 @@
 // From a point of light to a body that the image resolves: the light goes on without a step.
 #include <gtest/gtest.h>
 
-#include "renderer/camera/point_response.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/camera_image.h"
+#include "renderer/optics/point_response.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
@@ -34,7 +34,7 @@ TEST(Handover, LightIsThatOfAPointFromATwentiethOfAPixelToFivePixels) {
          {std::optional<PointSpreadFunction>{}, std::optional(PointSpreadFunction{.sigma_px = 0.8}),
           std::optional(PointSpreadFunction{.sigma_px = 0.3, .cutoff_per_px = 1.5})}) {
         Camera c = camera(81, 81, kView_px);
-        c.point_spread = spread;
+        c.optics.point_spread = spread;
         CameraRenderer renderer(*render_scene, c);
         RadianceImage image(c.width, c.height);
         std::uint32_t frame = 0;
@@ -112,7 +112,7 @@ TEST(Handover, PlaceAndFormAreThoseOfAPointBetweenThePixels) {
             for (const bool fisheye : {false, true}) {
                 Camera c = camera(81, 81, kView_px);
                 if (fisheye) c.model = kannala_brandt(pinhole_of(c), {0.1, -0.02, 0, 0});
-                c.point_spread = spread;
+                c.optics.point_spread = spread;
                 CameraRenderer renderer(*render_scene, c);
                 const PointResponse response(spread, 0);
                 RadianceImage image(c.width, c.height);

@@ -414,7 +414,7 @@ TEST(TinyBody, SameBytesOnOneTwoAndSevenThreadsWithAndWithoutALens) {
                                                 static_cast<std::size_t>(threads));
                 tbb::task_arena(threads).execute([&] {
                     Camera c = camera(45, 38, 2000);
-                    if (lens) c.lens = Lens{0.05, 50};
+                    if (lens) c.optics.lens = Lens{0.05, 50};
                     pictures.push_back(render(*render_scene, c, {}, {.spp = 2, .method = method}).pixels);
                 });
             }

@@ -1,8 +1,8 @@
 // Distances, edges and thin gaps on which a tracer in single precision fails.
 #include <gtest/gtest.h>
 
-#include "renderer/camera/detector.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/detector/detector.h"
 #include "renderer/frame/camera_image.h"
 #include "tests/support/shapes.h"
 

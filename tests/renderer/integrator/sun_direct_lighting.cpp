@@ -146,7 +146,7 @@ void trace(const Frame& f, const CameraSamples& s, TracedRays& p) {
 TEST(CameraBatch, RaysEqualThoseOfSinglePixels) {
     std::mt19937_64 random(4);
     Camera pinhole = camera(200, 160, 400), lens = pinhole;
-    lens.lens = Lens{0.05, 6};
+    lens.optics.lens = Lens{0.05, 6};
     for (const Camera& c : {pinhole, lens}) {
         const BlockerStage stage(c);
         const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);
@@ -164,8 +164,8 @@ TEST(CameraBatch, RaysEqualThoseOfSinglePixels) {
                 const double y = s.centre ? s.y[i] : s.y[i] + u[1] - 0.5;
                 Ray ray = camera_ray(c, stage.T, x, y);
                 Vec3 sun = f.sun->sample(u[2], u[3]);
-                if (c.lens) {
-                    ray = lens_ray(c, *c.lens, stage.T, x, y, aperture_point(*c.lens, u[2], u[3]));
+                if (c.optics.lens) {
+                    ray = lens_ray(c, *c.optics.lens, stage.T, x, y, aperture_point(*c.optics.lens, u[2], u[3]));
                     const SamplePoint more = sampler.point(s.sample[i], 2);
                     sun = f.sun->sample(more[2], more[3]);
                 }
@@ -180,7 +180,7 @@ TEST(CameraBatch, RaysEqualThoseOfSinglePixels) {
 TEST(CameraBatch, OneSampleGoesThroughAllCentres) {
     std::mt19937_64 random(7);
     Camera c = camera(200, 160, 400);
-    c.lens = Lens{0.05, 6};
+    c.optics.lens = Lens{0.05, 6};
     BlockerStage stage(c);
     stage.settings.spp = 1;
     const Frame f = make_frame(stage.render_scene, stage.at, stage.view, stage.T, stage.settings);

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "base/constants.h"
-#include "renderer/camera/detector.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/detector/detector.h"
 #include "renderer/frame/camera_image.h"
 #include "tests/support/cameras.h"
 #include "tests/support/shapes.h"
@@ -120,7 +120,7 @@ protected:
         camera.width = 480, camera.height = 360;
         camera.format = PixelFormat::grey;
         camera.white_radiance = 1.1;
-        camera.point_spread = PointSpreadFunction{.sigma_px = 1};
+        camera.optics.point_spread = PointSpreadFunction{.sigma_px = 1};
     }
 
     void take_views(const std::shared_ptr<const CameraModel>& model, int views) {

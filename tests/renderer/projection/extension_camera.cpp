@@ -203,7 +203,7 @@ TEST(EquidistantCamera, PixelsBeyondTheImageCircleAreBlack) {
 TEST(EquidistantCamera, ItsLensBlursToTheCircleOfConfusion) {
     // A far point on the axis, focused near: a disc of aperture / focus radians.
     Camera c = with_equidistant(camera(120, 120, 1), 400);
-    c.lens = Lens{0.1, 1.0};
+    c.optics.lens = Lens{0.1, 1.0};
     const Blob b = blob(rendered(glowing_sphere(1000, {0, 0, 1e5}), c, {}, {.spp = 256}), *c.model);
     const double radiance = b.area_px2;  // of all pixels together: the sphere's own image
     EXPECT_NEAR(radiance, kPi * std::pow(400 * 0.01, 2), 0.02 * radiance);

@@ -145,11 +145,11 @@ TEST(SceneFile, ReadsCamerasAndLidars) {
     EXPECT_EQ(overview.period_ns, 400'000'000);
     EXPECT_EQ(overview.white_radiance, 300);
     EXPECT_FALSE(overview.detector);
-    ASSERT_TRUE(overview.lens && c.lens);
-    EXPECT_DOUBLE_EQ(overview.lens->aperture_diameter_m, 0.05 / 2.8);
-    EXPECT_EQ(overview.lens->focus_distance_m, 20);
-    EXPECT_EQ(c.lens->aperture_diameter_m, 0.004);
-    EXPECT_EQ(c.lens->focus_distance_m, std::numeric_limits<double>::infinity());
+    ASSERT_TRUE(overview.optics.lens && c.optics.lens);
+    EXPECT_DOUBLE_EQ(overview.optics.lens->aperture_diameter_m, 0.05 / 2.8);
+    EXPECT_EQ(overview.optics.lens->focus_distance_m, 20);
+    EXPECT_EQ(c.optics.lens->aperture_diameter_m, 0.004);
+    EXPECT_EQ(c.optics.lens->focus_distance_m, std::numeric_limits<double>::infinity());
 
     ASSERT_EQ(s.lidars.size(), 1u);
     EXPECT_EQ(s.lidars[0].mount, 1);
@@ -246,7 +246,7 @@ TEST(SceneFile, DefaultsAreTheManuals) {
     EXPECT_FALSE(c.embedded_line);
     EXPECT_EQ(c.late, LatePolicy::late);
     EXPECT_FALSE(c.detector);
-    EXPECT_FALSE(c.lens);
+    EXPECT_FALSE(c.optics.lens);
     EXPECT_TRUE(s.lights.empty());
     EXPECT_TRUE(s.lidars.empty());
     EXPECT_EQ(s.render.method, RenderSettings::Method::direct);

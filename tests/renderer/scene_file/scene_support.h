@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/result.h"
+#include "renderer/keys/toml_file.h"
 #include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
@@ -40,6 +41,20 @@ public:
 private:
     static constexpr const char* kMemory = "/dev/shm";
 };
+
+/// What `read` makes of a text that is one table of a scene file with these keys. A problem is a failure.
+template <class Read>
+auto read_table(const std::string& text, const TableKeys& keys, const Read& read) {
+    const MemoryFolder folder;
+    const std::string path = folder.write("table.toml", text);
+    const auto file = TomlFile::read(path, "scene");
+    Problems problems(path);
+    TableReader table = file->root("the table", problems, &keys);
+    auto out = read(table);
+    table.finish();
+    if (!problems.none()) ADD_FAILURE() << text << problems.first().text();
+    return out;
+}
 
 inline std::string data_file(const std::string& name) {
     return test::source_path("tests/data/scenes/") + name;

@@ -5,7 +5,7 @@
 #include <atomic>
 #include <utility>
 
-#include "apps/exposure_advice.h"
+#include "apps/commands/exposure_advice.h"
 #include "apps/warnings.h"
 #include "emulator/clock.h"
 #include "emulator/log/statistics.h"

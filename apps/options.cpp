@@ -15,8 +15,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "base/nearest_name.h"
 #include "base/result.h"
+#include "base/text/nearest_name.h"
 
 namespace narpa::cli {
 namespace {

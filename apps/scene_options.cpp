@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "apps/warnings.h"
-#include "base/nearest_name.h"
+#include "base/text/nearest_name.h"
 #include "renderer/keys/shipped_file.h"
 
 namespace narpa::cli {

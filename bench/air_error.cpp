@@ -9,11 +9,11 @@
 
 #include "base/constants.h"
 #include "bench/statistics.h"
-#include "renderer/atmosphere/hosek_wilkie.h"
-#include "renderer/atmosphere/path_traced_air.h"
-#include "renderer/atmosphere/ray_bundle.h"
-#include "renderer/atmosphere/refraction.h"
-#include "renderer/atmosphere/scattered_light.h"
+#include "renderer/atmosphere/refraction/ray_bundle.h"
+#include "renderer/atmosphere/refraction/refraction.h"
+#include "renderer/atmosphere/scattering/hosek_wilkie.h"
+#include "renderer/atmosphere/scattering/path_traced_air.h"
+#include "renderer/atmosphere/scattering/scattered_light.h"
 
 namespace narpa {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "bench/convergence.h"
-#include "bench/reference_loop.h"
+#include "bench/embree/reference_loop.h"
 #include "emulator/threads.h"
 #include "emulator/world.h"
 #include "renderer/frame/camera_image.h"

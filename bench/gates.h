@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/budget_ladder.h"
-#include "bench/raw_embree.h"
+#include "bench/embree/raw_embree.h"
 #include "emulator/threads.h"
 #include "emulator/world.h"
 #include "renderer/frame/camera_image.h"

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "base/counter_random.h"
-#include "bench/raw_embree_scene.h"
+#include "bench/embree/raw_embree_scene.h"
 #include "bench/statistics.h"
 #include "emulator/lidar/lidar_unit.h"
 #include "renderer/lidar/beam_cone.h"

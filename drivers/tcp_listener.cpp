@@ -8,7 +8,7 @@
 #include <cstring>
 #include <utility>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 
 namespace narpa {
 

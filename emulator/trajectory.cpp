@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "base/csv.h"
+#include "base/text/csv.h"
 
 namespace narpa {
 namespace {

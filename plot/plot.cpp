@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/base64.h"
+#include "base/text/base64.h"
 #include "base/program_beside.h"
 #include "base/write_file.h"
 

@@ -1,8 +1,8 @@
 // narpa-usbcan - a USB-CAN adapter in software (gs_usb, as candleLight), served over USB/IP, with any CAN bus
 // behind it.
 #include "apps/programs/program.h"
-#include "base/read_number.h"
 #include "base/stop.h"
+#include "base/text/read_number.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/usb/faulty_device.h"
 #include "drivers/usb/gs_usb_device.h"

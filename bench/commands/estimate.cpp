@@ -6,17 +6,17 @@
 #include <filesystem>
 
 #include "apps/scene_options.h"
-#include "bench/approach.h"
-#include "bench/cold.h"
 #include "bench/commands/commands.h"
 #include "bench/commands/scene.h"
-#include "bench/consistency.h"
-#include "bench/consistency_scenes.h"
-#include "bench/filter.h"
-#include "bench/icp.h"
-#include "bench/pnp.h"
+#include "bench/estimation/approach.h"
+#include "bench/estimation/cold.h"
+#include "bench/estimation/consistency.h"
+#include "bench/estimation/consistency_scenes.h"
+#include "bench/estimation/filter.h"
+#include "bench/estimation/icp.h"
+#include "bench/estimation/pnp.h"
+#include "bench/estimation/stereo.h"
 #include "bench/statistics.h"
-#include "bench/stereo.h"
 #include "plot/plot.h"
 
 namespace narpa::cli {

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/text_lines.h"
+#include "base/text/text_lines.h"
 #include "drivers/can/buses.h"
 #include "drivers/descriptor.h"
 #include "protocols/can/candump.h"

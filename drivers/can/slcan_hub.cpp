@@ -13,7 +13,7 @@
 #include <cstring>
 #include <vector>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 #include "drivers/can/buses.h"
 #include "drivers/can/client_hub.h"
 #include "drivers/can/slcan_stream.h"

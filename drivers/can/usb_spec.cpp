@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 #include "drivers/usb/usb_devices.h"
 
 namespace narpa {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 
 namespace narpa {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 
 namespace narpa {
 namespace {

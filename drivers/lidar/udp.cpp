@@ -11,7 +11,7 @@
 #include <optional>
 #include <utility>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 #include "drivers/can/datagram.h"
 #include "drivers/descriptor.h"
 #include "drivers/lidar/backends.h"

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 #include "drivers/descriptor.h"
 
 namespace narpa {

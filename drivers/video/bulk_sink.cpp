@@ -6,7 +6,7 @@
 #include <array>
 #include <limits>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 #include "drivers/descriptor.h"
 #include "drivers/usb/usb_link.h"
 #include "drivers/video/backends.h"

@@ -9,8 +9,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "base/csv.h"
-#include "base/read_number.h"
+#include "base/text/csv.h"
+#include "base/text/read_number.h"
 #include "protocols/ledger_fields.h"
 
 namespace narpa {

@@ -1,7 +1,8 @@
 /// estimator/dense/dense_tuning.h - the tuned constants of dense alignment, and what they were tuned on.
 ///
 /// Data sets:
-/// - random frames: `narpa bench estimate --only consistency` (bench/consistency.h), tuned for NEES near 6 and no
+/// - random frames: `narpa bench estimate --only consistency` (bench/estimation/consistency.h), tuned for NEES near
+/// 6 and no
 ///   answer beyond six sigma;
 /// - docking frames: the docking scene at 10 and 16.6 m, 640 x 480 pixels, guesses 3 degrees and 3 % off, tuned for
 ///   time at equal errors over the bound.

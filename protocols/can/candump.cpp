@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "base/read_number.h"
+#include "base/text/read_number.h"
 #include "protocols/can/hex.h"
 #include "protocols/little_endian.h"
 

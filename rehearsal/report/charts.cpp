@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "base/base64.h"
+#include "base/text/base64.h"
 #include "plot/plot.h"
 #include "rehearsal/report/run_report.h"
 #include "rehearsal/runner/child_process.h"

@@ -8,7 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "base/base64.h"
+#include "base/text/base64.h"
 #include "rehearsal/judge/judge.h"
 #include "rehearsal/report/template.h"
 #include "rehearsal/runner/child_process.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "renderer/assets/dem_process.h"
-#include "renderer/assets/mesh_message.h"
+#include "renderer/assets/meshes/mesh_message.h"
 
 namespace narpa::mesh_message {
 

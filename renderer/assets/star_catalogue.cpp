@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "base/constants.h"
-#include "base/csv.h"
+#include "base/text/csv.h"
 
 namespace narpa {
 namespace {

@@ -5,7 +5,7 @@
 #include "renderer/atmosphere/air_kind.h"
 #include "renderer/atmosphere/fast_exp.h"
 #include "renderer/atmosphere/gauss_legendre.h"
-#include "renderer/atmosphere/rayleigh.h"
+#include "renderer/atmosphere/scattering/rayleigh.h"
 
 namespace narpa {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "renderer/atmosphere/air_description.h"
-#include "renderer/atmosphere/spherical_harmonics.h"
+#include "renderer/atmosphere/scattering/spherical_harmonics.h"
 
 namespace narpa {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "renderer/atmosphere/air_kind.h"
-#include "renderer/atmosphere/rayleigh.h"
+#include "renderer/atmosphere/scattering/rayleigh.h"
 #include "renderer/keys/toml_reader.h"
 
 namespace narpa {

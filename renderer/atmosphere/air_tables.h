@@ -10,7 +10,7 @@
 
 #include "renderer/atmosphere/air_path.h"
 #include "renderer/atmosphere/fast_exp.h"
-#include "renderer/atmosphere/spherical_harmonics.h"
+#include "renderer/atmosphere/scattering/spherical_harmonics.h"
 
 namespace narpa {
 

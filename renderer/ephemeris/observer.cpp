@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-#include "renderer/atmosphere/refractive_index.h"
+#include "renderer/atmosphere/refraction/refractive_index.h"
 #include "renderer/ephemeris/time_scales.h"
 
 namespace narpa {

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "base/pose.h"
-#include "renderer/atmosphere/refraction.h"
+#include "renderer/atmosphere/refraction/refraction.h"
 
 namespace narpa {
 

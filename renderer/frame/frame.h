@@ -6,7 +6,7 @@
 #include "base/camera_pose.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/frame_settings.h"
-#include "renderer/frame/subpixel_bodies.h"
+#include "renderer/frame/subpixel/subpixel_bodies.h"
 #include "renderer/integrator/integrator.h"
 
 namespace narpa {

@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "base/radiance_image.h"
+#include "renderer/frame/culling/tile_culling.h"
 #include "renderer/frame/frame_error.h"
 #include "renderer/frame/g_buffer.h"
 #include "renderer/frame/pixel_fill.h"
 #include "renderer/frame/sample_plan.h"
-#include "renderer/frame/tile_culling.h"
 
 namespace narpa {
 

@@ -28,8 +28,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "renderer/frame/culling/tile_culling.h"
 #include "renderer/frame/frame.h"
-#include "renderer/frame/tile_culling.h"
 
 namespace narpa {
 

@@ -12,7 +12,7 @@
 #include <limits>
 
 #include "base/each_isa.h"
-#include "renderer/frame/tile_window.h"
+#include "renderer/frame/culling/tile_window.h"
 #include "renderer/frame/tuning.h"
 #include "renderer/integrator/sampler.h"
 

@@ -8,7 +8,7 @@
 
 #include "base/each_isa.h"
 #include "base/fast_math.h"
-#include "renderer/frame/tile_window.h"
+#include "renderer/frame/culling/tile_window.h"
 #include "renderer/frame/tuning.h"
 #include "renderer/integrator/sampler.h"
 

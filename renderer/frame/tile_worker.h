@@ -13,7 +13,7 @@
 
 #include "renderer/frame/camera_rays.h"
 #include "renderer/frame/frame_passes.h"
-#include "renderer/frame/subpixel_light.h"
+#include "renderer/frame/subpixel/subpixel_light.h"
 #include "renderer/frame/tuning.h"
 
 namespace narpa {

@@ -12,7 +12,7 @@
 
 #include "renderer/geometry/ray_batch.h"
 #include "renderer/geometry/triangle.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {

@@ -20,8 +20,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/file_bytes.h"
-#include "renderer/assets/image_codecs.h"
-#include "renderer/assets/image_reader.h"
+#include "renderer/assets/images/image_codecs.h"
+#include "renderer/assets/images/image_reader.h"
 
 namespace narpa {
 namespace {

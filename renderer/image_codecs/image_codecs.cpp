@@ -1,5 +1,6 @@
-// The shared library that renderer/assets/image_codecs.h loads. It alone is linked to OpenCV's codecs and libtiff.
-#include "renderer/assets/image_codecs.h"
+// The shared library that renderer/assets/images/image_codecs.h loads. It alone is linked to OpenCV's codecs and
+// libtiff.
+#include "renderer/assets/images/image_codecs.h"
 
 #include <opencv2/imgcodecs.hpp>
 

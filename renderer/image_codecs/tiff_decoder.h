@@ -6,7 +6,7 @@
 #include <span>
 
 #include "base/result.h"
-#include "renderer/assets/decoded_image.h"
+#include "renderer/assets/images/decoded_image.h"
 
 namespace narpa {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 
 namespace narpa {
 namespace {

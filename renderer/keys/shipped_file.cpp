@@ -7,8 +7,8 @@
 #include <fstream>
 #include <string_view>
 
-#include "base/nearest_name.h"
 #include "base/program_beside.h"
+#include "base/text/nearest_name.h"
 
 namespace narpa {
 namespace {

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <optional>
 
-#include "base/nearest_name.h"
+#include "base/text/nearest_name.h"
 #include "renderer/keys/other_names.h"
 #include "renderer/keys/toml_depth.h"
 

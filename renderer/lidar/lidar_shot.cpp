@@ -11,7 +11,7 @@
 #include "renderer/integrator/shading.h"
 #include "renderer/lidar/plain_returns.h"
 #include "renderer/material/bsdf_kind.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 
 namespace narpa {
 namespace {

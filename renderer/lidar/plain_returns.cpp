@@ -8,7 +8,7 @@
 #include "base/each_isa.h"
 #include "renderer/material/bsdf.h"
 #include "renderer/material/phong_lobe.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 
 namespace narpa {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "base/constants.h"
-#include "renderer/atmosphere/scattered_light.h"
+#include "renderer/atmosphere/scattering/scattered_light.h"
 #include "renderer/keys/toml_reader.h"
 
 namespace narpa {

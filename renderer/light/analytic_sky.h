@@ -1,10 +1,10 @@
-/// renderer/light/analytic_sky.h - Hosek and Wilkie's sky (renderer/atmosphere/hosek_wilkie.h) as a background and
-/// a light, over flat ground; and the air that attenuates the Sun in it.
+/// renderer/light/analytic_sky.h - Hosek and Wilkie's sky (renderer/atmosphere/scattering/hosek_wilkie.h) as a
+/// background and a light, over flat ground; and the air that attenuates the Sun in it.
 #pragma once
 
 #include <vector>
 
-#include "renderer/atmosphere/hosek_wilkie.h"
+#include "renderer/atmosphere/scattering/hosek_wilkie.h"
 #include "renderer/light/sky_kind.h"
 #include "renderer/material/directions.h"
 

@@ -4,13 +4,13 @@
 ///
 /// An ellipsoid's air follows the ellipsoid: positions are scaled to a sphere of radius `ground_radius_m`, which
 /// changes lengths by up to the flattening, 0.3 % for the Earth. Rays are straight; refraction is handled for
-/// apparent positions (renderer/atmosphere/refraction.h).
+/// apparent positions (renderer/atmosphere/refraction/refraction.h).
 #pragma once
 
 #include <memory>
 #include <optional>
 
-#include "renderer/atmosphere/ray_bundle.h"
+#include "renderer/atmosphere/refraction/ray_bundle.h"
 #include "renderer/light/medium.h"
 #include "renderer/scene/scene.h"
 
@@ -47,7 +47,7 @@ public:
     [[nodiscard]] MediumSegment along(const BodyPoses& at, const Ray& ray, double range_m,
                                       double u) const noexcept override;
     [[nodiscard]] bool uses_random_numbers() const noexcept override { return false; }
-    /// Camera rays from one origin are interpolated (renderer/atmosphere/ray_bundle.h).
+    /// Camera rays from one origin are interpolated (renderer/atmosphere/refraction/ray_bundle.h).
     void along_each(const BodyPoses& at, std::span<const MediumRay> rays,
                     std::span<MediumSegment> segments) const noexcept override;
     [[nodiscard]] Rgb transmittance(const BodyPoses& at, const Ray& ray, double range_m) const noexcept override;

@@ -8,10 +8,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "base/base64.h"
 #include "base/file_bytes.h"
-#include "base/text_lines.h"
-#include "renderer/assets/mesh_readers.h"
+#include "base/text/base64.h"
+#include "base/text/text_lines.h"
+#include "renderer/assets/meshes/mesh_readers.h"
 
 namespace narpa {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "renderer/assets/mesh_message.h"
+#include "renderer/assets/meshes/mesh_message.h"
 #include "renderer/mesh_reader/gltf_file.h"
 
 namespace narpa {

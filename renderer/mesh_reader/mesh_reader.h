@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "renderer/assets/mesh_message.h"
+#include "renderer/assets/meshes/mesh_message.h"
 
 struct aiMaterial;
 struct aiScene;

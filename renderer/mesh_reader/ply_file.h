@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "base/text_cursor.h"
+#include "base/text/text_cursor.h"
 
 namespace narpa {
 

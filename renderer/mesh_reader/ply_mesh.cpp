@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "renderer/assets/mesh_readers.h"
+#include "renderer/assets/meshes/mesh_readers.h"
 #include "renderer/mesh_reader/mesh_reader.h"
 #include "renderer/mesh_reader/ply_file.h"
 

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "base/file_bytes.h"
-#include "base/text_cursor.h"
-#include "renderer/assets/mesh_readers.h"
+#include "base/text/text_cursor.h"
+#include "renderer/assets/meshes/mesh_readers.h"
 #include "renderer/mesh_reader/mesh_reader.h"
 
 namespace narpa {

@@ -56,7 +56,7 @@ std::vector<std::string> doubtful_units(const Scene& scene) {
             check(kUsualExposure, detector->exposure_s);
             check(kUsualWell, detector->full_well_e);
         }
-        if (camera.lens) check(kUsualAperture, camera.lens->aperture_diameter_m);
+        if (camera.optics.lens) check(kUsualAperture, camera.optics.lens->aperture_diameter_m);
     }
     return all;
 }

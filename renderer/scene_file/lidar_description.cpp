@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "base/constants.h"
-#include "base/csv.h"
+#include "base/text/csv.h"
 #include "protocols/lidar/pattern_lidar.h"
 #include "renderer/keys/toml_file.h"
 

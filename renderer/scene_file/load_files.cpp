@@ -8,8 +8,8 @@
 #include <tuple>
 #include <utility>
 
-#include "renderer/assets/mesh_file.h"
-#include "renderer/assets/texture_file.h"
+#include "renderer/assets/images/texture_file.h"
+#include "renderer/assets/meshes/mesh_file.h"
 #include "renderer/keys/shipped_file.h"
 #include "renderer/scene_file/scene_parts.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/assets/point_spread_file.h"
+#include "renderer/assets/images/point_spread_file.h"
 #include "renderer/detector/detector_stage.h"
 #include "renderer/optics/optical_effect.h"
 #include "renderer/scene_file/scene_parts.h"

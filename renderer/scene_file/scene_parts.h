@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "renderer/assets/dem_process.h"
-#include "renderer/assets/texture_file.h"
+#include "renderer/assets/images/texture_file.h"
 #include "renderer/ephemeris/observed_courses.h"
 #include "renderer/keys/toml_reader.h"
 #include "renderer/scene/mounting.h"

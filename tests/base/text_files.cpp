@@ -7,8 +7,8 @@
 #include <random>
 #include <sstream>
 
-#include "base/csv.h"
-#include "base/text_cursor.h"
+#include "base/text/csv.h"
+#include "base/text/text_cursor.h"
 
 namespace narpa {
 namespace {

@@ -1,6 +1,6 @@
 // The approach bench: results on the docking scene and on a model of the ISS before the Earth at the edge of
 // eclipse, and its plots.
-#include "bench/approach.h"
+#include "bench/estimation/approach.h"
 #include "base/constants.h"
 
 #include <gtest/gtest.h>

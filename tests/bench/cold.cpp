@@ -1,5 +1,5 @@
 // Cold starts: each trial is its number's alone, and of a few none is wrong.
-#include "bench/cold.h"
+#include "bench/estimation/cold.h"
 
 #include <gtest/gtest.h>
 

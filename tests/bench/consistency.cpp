@@ -1,5 +1,5 @@
 // The campaign of consistency: faults that it found stay found, and of a few trials of each method none lies.
-#include "bench/consistency.h"
+#include "bench/estimation/consistency.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/stop.h"
-#include "bench/consistency_scenes.h"
+#include "bench/estimation/consistency_scenes.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/view/model_view.h"
 #include "renderer/detector/detector.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "bench/filter.h"
+#include "bench/estimation/filter.h"
 
 namespace narpa {
 namespace {

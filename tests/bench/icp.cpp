@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "bench/icp.h"
+#include "bench/estimation/icp.h"
 #include "emulator/lidar/lidar_unit.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/cloud/range_points.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "bench/pnp.h"
+#include "bench/estimation/pnp.h"
 #include "estimator/pose/pose_estimate.h"
 #include "tests/support/command.h"
 

@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "bench/budget_ladder.h"
-#include "bench/raw_embree.h"
-#include "bench/reference_loop.h"
+#include "bench/embree/raw_embree.h"
+#include "bench/embree/reference_loop.h"
 #include "emulator/world.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/scene_file/scene_file.h"

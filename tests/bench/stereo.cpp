@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 
-#include "bench/stereo.h"
+#include "bench/estimation/stereo.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/support/image_files.h"
 #include "tests/support/paths.h"

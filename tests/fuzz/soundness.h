@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/assets/mesh_file.h"
+#include "renderer/assets/meshes/mesh_file.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace narpa::fuzz {

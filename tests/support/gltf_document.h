@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "base/base64.h"
+#include "base/text/base64.h"
 #include "tests/support/image_bytes.h"
 
 namespace narpa::test {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "renderer/assets/image_codecs.h"
+#include "renderer/assets/images/image_codecs.h"
 
 namespace narpa::test {
 

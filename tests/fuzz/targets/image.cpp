@@ -1,5 +1,5 @@
 // The image formats of textures.
-#include "renderer/assets/texture_file.h"
+#include "renderer/assets/images/texture_file.h"
 #include "tests/fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,5 +1,5 @@
 // The mesh formats that narpa-mesh-reader reads; the first bytes say which.
-#include "renderer/assets/mesh_process.h"
+#include "renderer/assets/meshes/mesh_process.h"
 #include "tests/fuzz/soundness.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -12,8 +12,8 @@
 #include <cstring>
 #include <random>
 
-#include "renderer/assets/point_spread_file.h"
-#include "renderer/assets/texture_file.h"
+#include "renderer/assets/images/point_spread_file.h"
+#include "renderer/assets/images/texture_file.h"
 #include "renderer/image/image_file.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"

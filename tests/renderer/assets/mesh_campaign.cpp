@@ -9,8 +9,8 @@
 #include <numbers>
 #include <random>
 
-#include "renderer/assets/mesh_process.h"
-#include "renderer/assets/mesh_readers.h"
+#include "renderer/assets/meshes/mesh_process.h"
+#include "renderer/assets/meshes/mesh_readers.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/campaign.h"
 #include "tests/support/gltf_document.h"

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-#include "renderer/assets/mesh_file.h"
+#include "renderer/assets/meshes/mesh_file.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/expect_has.h"

@@ -1,9 +1,9 @@
-#include "renderer/assets/mesh_process.h"
+#include "renderer/assets/meshes/mesh_process.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "renderer/assets/mesh_file.h"
+#include "renderer/assets/meshes/mesh_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/paths.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/assets/mesh_file.h"
+#include "renderer/assets/meshes/mesh_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/expect_has.h"
 

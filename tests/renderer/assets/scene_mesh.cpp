@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "renderer/assets/mesh_file.h"
-#include "renderer/assets/mesh_readers.h"
+#include "renderer/assets/meshes/mesh_file.h"
+#include "renderer/assets/meshes/mesh_readers.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "renderer/assets/mesh_file.h"
+#include "renderer/assets/meshes/mesh_file.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/image_files.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "renderer/assets/texture_file.h"
+#include "renderer/assets/images/texture_file.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/image_files.h"
 

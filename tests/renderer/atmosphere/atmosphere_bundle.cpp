@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/constants.h"
-#include "renderer/atmosphere/ray_bundle.h"
+#include "renderer/atmosphere/refraction/ray_bundle.h"
 
 namespace narpa::test {
 namespace {

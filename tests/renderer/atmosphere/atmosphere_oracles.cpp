@@ -6,9 +6,9 @@
 #include "base/constants.h"
 #include "renderer/atmosphere/air_path.h"
 #include "renderer/atmosphere/chapman.h"
-#include "renderer/atmosphere/rayleigh.h"
-#include "renderer/atmosphere/refraction.h"
-#include "renderer/atmosphere/refractive_index.h"
+#include "renderer/atmosphere/refraction/refraction.h"
+#include "renderer/atmosphere/refraction/refractive_index.h"
+#include "renderer/atmosphere/scattering/rayleigh.h"
 #include "tests/support/oracle.h"
 
 namespace narpa {

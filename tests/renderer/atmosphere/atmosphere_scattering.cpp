@@ -7,9 +7,9 @@
 
 #include "base/constants.h"
 #include "renderer/atmosphere/gauss_legendre.h"
-#include "renderer/atmosphere/path_traced_air.h"
-#include "renderer/atmosphere/rayleigh.h"
-#include "renderer/atmosphere/scattered_light.h"
+#include "renderer/atmosphere/scattering/path_traced_air.h"
+#include "renderer/atmosphere/scattering/rayleigh.h"
+#include "renderer/atmosphere/scattering/scattered_light.h"
 
 namespace narpa {
 namespace {

@@ -1,5 +1,5 @@
 // Which bodies a tile of the image may show: none is missed, and little more is marked.
-#include "renderer/frame/tile_culling.h"
+#include "renderer/frame/culling/tile_culling.h"
 
 #include <gtest/gtest.h>
 

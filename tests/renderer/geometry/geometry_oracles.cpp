@@ -8,7 +8,7 @@
 #include "renderer/geometry/sphere_roots.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/material/bsdf.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 #include "tests/support/oracle.h"
 #include "tests/support/shapes.h"
 

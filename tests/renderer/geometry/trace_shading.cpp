@@ -8,7 +8,7 @@
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/light/sun_disc.h"
 #include "renderer/material/bsdf.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 #include "tests/renderer/camera/camera_support.h"
 
 namespace narpa {

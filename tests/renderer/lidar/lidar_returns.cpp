@@ -5,7 +5,7 @@
 
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/light/render_scene.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/renderer/material/texture_support.h"
 #include "tests/support/shapes.h"

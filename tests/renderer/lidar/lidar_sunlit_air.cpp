@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "renderer/atmosphere/ray_bundle.h"
+#include "renderer/atmosphere/refraction/ray_bundle.h"
 #include "renderer/lidar/lidar_receiver.h"
 #include "renderer/light/atmosphere.h"
 #include "tests/renderer/integrator/path_support.h"

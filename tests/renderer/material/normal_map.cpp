@@ -5,7 +5,7 @@
 #include <random>
 
 #include "renderer/integrator/shading.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 #include "tests/renderer/material/texture_support.h"
 
 namespace narpa {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <random>
 
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 
 namespace narpa {
 namespace {

@@ -7,7 +7,7 @@
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/integrator/shading.h"
-#include "renderer/material/texture_lookup.h"
+#include "renderer/material/texture/texture_lookup.h"
 #include "tests/renderer/material/texture_support.h"
 #include "tests/support/cameras.h"
 #include "tests/support/shapes.h"

@@ -7,7 +7,7 @@
 
 #include <functional>
 
-#include "renderer/assets/point_spread_file.h"
+#include "renderer/assets/images/point_spread_file.h"
 #include "renderer/optics/image_optics.h"
 #include "renderer/scene_file/scene_file.h"
 #include "tests/renderer/optics/point_spread_support.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "base/constants.h"
-#include "renderer/frame/tile_culling.h"
+#include "renderer/frame/culling/tile_culling.h"
 #include "renderer/projection/double_sphere.h"
 #include "tests/renderer/camera/camera_support.h"
 #include "tests/support/cameras.h"

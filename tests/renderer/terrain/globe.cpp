@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "renderer/assets/mesh_file.h"
+#include "renderer/assets/meshes/mesh_file.h"
 #include "renderer/ephemeris/iau_rotation.h"
 #include "renderer/ephemeris/sun_direction.h"
 #include "tests/renderer/scene_file/scene_support.h"

@@ -1,0 +1,53 @@
+/// renderer/frame/culling/tile_culling.h - which bodies each tile of the image may show.
+///
+/// Rays are traced only through tiles that some body's surface may cover, and against those bodies alone: the cost
+/// of a frame is proportional to the pixels that bodies cover, not to the sensor's size.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "renderer/frame/culling/body_culling.h"
+#include "renderer/geometry/tracer.h"
+
+namespace narpa {
+
+class TileCulling {
+public:
+    /// Both arguments outlive it. Allocates only here: about 80 bytes per tile, whatever the number of bodies.
+    TileCulling(const Tracer& tracer, const Camera& camera);
+
+    /// Updates the lists for these poses. Conservative: if a ray through any point of a tile and of the lens (null:
+    /// a pinhole) meets a body, the body is in the tile's list, also if it is as near as the camera, partly behind
+    /// it, or around it. Allocates nothing.
+    void update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept;
+    /// Lists all bodies in every tile: no culling.
+    void list_all() noexcept;
+
+    /// Bodies that rays through any of the tile's pixels may meet, in ascending order. All bodies where they are
+    /// more than kMaxListed.
+    [[nodiscard]] std::span<const std::uint32_t> bodies(int tile_x, int tile_y) const noexcept;
+    static constexpr std::size_t kMaxListed = 16;
+
+    [[nodiscard]] int tiles_x() const noexcept { return tiles_x_; }
+    [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
+
+private:
+    void list(std::uint32_t body) noexcept;
+    [[nodiscard]] std::size_t index(int tile_x, int tile_y) const noexcept {
+        return static_cast<std::size_t>(tile_y) * static_cast<std::size_t>(tiles_x_) +
+               static_cast<std::size_t>(tile_x);
+    }
+
+    const Tracer& tracer_;
+    const Camera& camera_;
+    int tiles_x_, tiles_y_;
+    std::vector<std::span<const BoxNode>> boxes_;  ///< of each body's shape
+    TileMask mask_;                                ///< scratch, for one body at a time
+    std::size_t max_listed_;
+    std::vector<std::uint8_t> listed_;  ///< number of bodies in each tile's list; max_listed_ + 1: overflow
+    std::vector<std::uint32_t> lists_;  ///< max_listed_ for each tile
+};
+
+}  // namespace narpa

@@ -10,6 +10,8 @@
 
 #include "renderer/assets/calibration_file.h"
 #include "renderer/assets/lidar_calibration.h"
+#include "renderer/projection/brown_conrady.h"
+#include "renderer/projection/kannala_brandt.h"
 #include "renderer/projection/projection_kind.h"
 #include "tests/renderer/scene_file/scene_support.h"
 #include "tests/support/campaign.h"

@@ -52,7 +52,7 @@ TEST(TextureFile, EveryEightBitCodeIsWithinHalfACodeOfTheStandard) {
 }
 
 TEST(TextureFile, UseChoosesTheCurveWhateverTheDepth) {
-    using Colour = TextureUse::Colour;
+    using Use = TextureUse;
     const MemoryFolder folder;
     cv::Mat eight(1, 256, CV_8UC1), sixteen(1, 256, CV_16UC1);
     for (int i = 0; i < 256; ++i) {
@@ -61,18 +61,18 @@ TEST(TextureFile, UseChoosesTheCurveWhateverTheDepth) {
     }
     test::write_image_file(folder / "8.png", eight);
     test::write_image_file(folder / "16.png", sixteen);
-    const auto codes = [&](const char* file, Colour colour) {
+    const auto codes = [&](const char* file, Use::Colour colour) {
         const Result<Texture> t = read_texture(folder / file, {.colour = colour});
         EXPECT_TRUE(t);
         return t->rgb;
     };
-    EXPECT_EQ(codes("8.png", Colour::srgb), codes("8.png", Colour::by_depth));
-    EXPECT_EQ(codes("16.png", Colour::linear), codes("16.png", Colour::by_depth));
-    EXPECT_EQ(codes("8.png", Colour::linear), codes("16.png", Colour::linear));
-    EXPECT_EQ(codes("8.png", Colour::srgb), codes("16.png", Colour::srgb));
-    EXPECT_NE(codes("8.png", Colour::srgb), codes("8.png", Colour::linear));
-    EXPECT_EQ(codes("16.png", Colour::normals), codes("16.png", Colour::linear));
-    EXPECT_EQ(codes("8.png", Colour::linear)[3 * 100], 25700);
+    EXPECT_EQ(codes("8.png", Use::Colour::srgb), codes("8.png", Use::Colour::by_depth));
+    EXPECT_EQ(codes("16.png", Use::Colour::linear), codes("16.png", Use::Colour::by_depth));
+    EXPECT_EQ(codes("8.png", Use::Colour::linear), codes("16.png", Use::Colour::linear));
+    EXPECT_EQ(codes("8.png", Use::Colour::srgb), codes("16.png", Use::Colour::srgb));
+    EXPECT_NE(codes("8.png", Use::Colour::srgb), codes("8.png", Use::Colour::linear));
+    EXPECT_EQ(codes("16.png", Use::Colour::normals), codes("16.png", Use::Colour::linear));
+    EXPECT_EQ(codes("8.png", Use::Colour::linear)[3 * 100], 25700);
 }
 
 TEST(TextureFile, SixteenBitsOfSrgbAreMadeLinear) {

@@ -132,7 +132,7 @@ Shot shoot_frame(const RenderScene& render_scene, const Camera& c, const Rigid3&
     render_radiance(render_scene, placed(render_scene.scene()), c, T, settings, shot.image, &shot.aovs);
     return shot;
 }
-double mean_of(const Rgb& p) {
+double mean_of_bands(const Rgb& p) {
     return mean_band(vec_cast<double>(p));
 }
 
@@ -166,7 +166,7 @@ TEST(Interval, OfASmoothPictureHoldsTheTruth) {
                     continue;
                 }
                 ++varied;
-                held += std::abs(mean_of(shot.image.pixels[i]) - mean_of(truth.image.pixels[i])) <=
+                held += std::abs(mean_of_bands(shot.image.pixels[i]) - mean_of_bands(truth.image.pixels[i])) <=
                         interval_95(variance, spp, 16);
             }
         }
@@ -188,7 +188,7 @@ TEST(Interval, OfStratifiedSamplesIsAsLargeAsTheScatterOfFrames) {
             const Shot a = shoot_frame(*render_scene, c, T, spp, 2 * frame);
             const Shot b = shoot_frame(*render_scene, c, T, spp, 2 * frame + 1);
             for (std::size_t i = 0; i < a.image.pixels.size(); ++i) {
-                const double difference = mean_of(a.image.pixels[i]) - mean_of(b.image.pixels[i]);
+                const double difference = mean_of_bands(a.image.pixels[i]) - mean_of_bands(b.image.pixels[i]);
                 scattered += difference * difference;
                 stated += static_cast<double>(a.aovs.variance[i]) + static_cast<double>(b.aovs.variance[i]);
             }
@@ -218,7 +218,7 @@ TEST(Interval, OfASphereOnAFewThousandthsOfAPixelHoldsTheTruth) {
             set_principal_point(c, cx, 4 + within(random));
             const Shot shot = shoot_frame(*render_scene, c, looking({distance, 0, 0}, {}), spp, frame);
             const double half = interval_95(static_cast<double>(shot.aovs.variance[4 * 9 + 4]), spp, 16);
-            held += std::abs(mean_of(shot.image.pixels[4 * 9 + 4]) - truth) <= half;
+            held += std::abs(mean_of_bands(shot.image.pixels[4 * 9 + 4]) - truth) <= half;
             EXPECT_LT(half, 0.1 * truth);
         }
         EXPECT_GE(held, 18) << spp;

@@ -47,7 +47,7 @@ template <class Read>
 auto read_table(const std::string& text, const TableKeys& keys, const Read& read) {
     const MemoryFolder folder;
     const std::string path = folder.write("table.toml", text);
-    const auto file = TomlFile::read(path, "scene");
+    const auto file = TomlFile::read(path, "scene", keys);
     Problems problems(path);
     TableReader table = file->root("the table", problems, &keys);
     auto out = read(table);

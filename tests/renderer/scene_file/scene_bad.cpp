@@ -141,7 +141,7 @@ const BadFile kBad[] = {
     {"AttitudeZero", BALL "attitude_wxyz = [0, 0, 0, 0]\n", 4, 17, "norm is 0"},
     {"AttitudeOfThree", BALL "attitude_wxyz = [1, 0, 0]\n", 4, 17, "expected an array of 4 numbers"},
     {"CanIdOdd", BALL "can_id = 0x105\n", 4, 10, "0x105 is not a base identifier, expected a multiple of 16"},
-    {"CanIdTooHigh", BALL "can_id = 0x600\n", 4, 10, "got 1536, expected an integer in [0, 1520]"},
+    {"CanIdTooHigh", BALL "can_id = 0x600\n", 4, 10, "got 0x600, expected an integer in [0x0, 0x5f0]"},
     {"CanIdTwice", BALL "can_id = 0x20\n[[body]]\nname = \"y\"\nsphere = {radius_m = 1}\ncan_id = 32\n", 8, 10,
      "0x020 is taken by body \"x\""},
     {"NoSensor", BALL "# no c4mera, no l1dar: camera\n", 1, 1, "at least one [[camera]] or [[lidar]]"},

@@ -11,6 +11,7 @@
 #include "renderer/detector/detector.h"
 #include "tests/estimator/pnp/pnp_support.h"
 #include "tests/support/cameras.h"
+#include "tests/support/campaign.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -167,21 +168,21 @@ TEST_P(ExposedOverTime, DenseAlignmentReachesItsBound) {
     DenseOptions options;
     options.motion = motion;
     options.samples_per_pixel = 128;  // four times the frame's samples: few enough errors of its own
-    constexpr int kFrames = 3;
+    const int frames = test::trials(1, 3);
     double over_bound = 0, ignored = 0;
-    for (std::uint32_t k = 0; k < kFrames; ++k) {
+    for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(frames); ++k) {
         take(k);
         const auto e = dense.align(frame, at, guess(), options, variance_dn2);
         ASSERT_TRUE(e) << e.error().text();
         ASSERT_EQ(e->status, DenseStatus::converged) << name(e->status);
         const auto bound = dense.bound(at, truth, options, variance_dn2);
         ASSERT_TRUE(bound) << bound.error().text();
-        over_bound += normalised_error_squared(error_between(truth, e->T_camera_body), *bound) / kFrames;
+        over_bound += normalised_error_squared(error_between(truth, e->T_camera_body), *bound) / frames;
         const auto i = ignoring.align(frame, at, guess(), options, variance_dn2);
         ASSERT_TRUE(i);
-        ignored += normalised_error_squared(error_between(truth, i->T_camera_body), *bound) / kFrames;
+        ignored += normalised_error_squared(error_between(truth, i->T_camera_body), *bound) / frames;
     }
-    EXPECT_LT(over_bound, 6 + 4 * std::sqrt(12.0 / kFrames));
+    EXPECT_LT(over_bound, 6 + 4 * std::sqrt(12.0 / frames));
     EXPECT_GT(ignored, GetParam().ignored);
 }
 

@@ -282,7 +282,7 @@ void Judge::judge_navigation(GateResult& gate) const {
     const bool good = findings.front().t_first_s == kInfinity;
     gate.state = good ? GateState::passed : GateState::failed;
     if (!good) gate.t_first_s = findings.front().t_first_s;
-    if (good) std::ranges::rotate(findings, findings.end() - 1);
+    if (good) std::rotate(findings.begin(), findings.end() - 1, findings.end());
     gate.reason = findings.front().text;
     for (const Finding& f : findings) {
         if (&f != &findings.front()) gate.details.push_back(f.text);

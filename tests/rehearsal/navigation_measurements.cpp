@@ -72,7 +72,7 @@ TEST_P(CameraMethods, RefuseAFrameThatTheCameraRepeats) {
     CameraPoseEstimator estimator(*stage().model, stage().model->cameras()[0], *GetParam(), 1);
     const Plant plant = plant_at({20, 0, 0}, {});
     const Prediction prediction = predicted(plant, chaser_target(plant));
-    const auto first = frame(*stage().model, plant, 3), second = frame(*stage().model, plant, 4);
+    const auto first = frame(*stage().model, plant, 3, 16), second = frame(*stage().model, plant, 4, 16);
     EXPECT_TRUE(estimator.measure(first, 0, prediction).pose);
     EXPECT_TRUE(estimator.measure(second, 1'000'000'000, prediction).pose) << "at rest, but with other noise";
     const MeasurementResult again = estimator.measure(first, 2'000'000'000, prediction);

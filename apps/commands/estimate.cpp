@@ -91,7 +91,7 @@ Status check_no_lidar(const EstimateOptions& o) {
     return Error{
         fmt::format("holds no packets of LiDAR \"{0}\": make them again by `narpa run {1} --can "
                     "log:{2}/can.log --lockstep --lidar {0}={0}.pcap`, then `narpa estimate {1} --lidar {0} "
-                    "--sweep {0}.pcap --time SECONDS`",
+                    "--sweep {0}.pcap --trajectory {2}/CAMERA.truth.csv`, with the log's name of a camera",
                     o.sensor, scene->file, o.input),
         o.input};
 }

@@ -25,6 +25,17 @@ json document(const std::string& file) {
     return read.is_discarded() ? json(nullptr) : read;
 }
 
+/// Whether a campaign's summary states its runs; the file may be from anyone.
+bool states_runs(const json& summary) {
+    constexpr std::uint64_t kMostRuns = 1'000'000;
+    const auto number = [](const json& of, const char* key) {
+        return of.is_object() && of.contains(key) && of[key].is_number_unsigned();
+    };
+    return number(summary, "runs") && summary["runs"].get<std::uint64_t>() <= kMostRuns &&
+           summary.contains("each") && summary["each"].is_array() && !summary["each"].empty() &&
+           number(summary["each"][0], "seed") && number(summary["each"][0], "run");
+}
+
 /// Replaces the gates by those of another file of the same scenario.
 Status take_gates(const std::string& folder, const std::string& file, Scenario& flown) {
     std::vector<std::string> set = flown.overrides;
@@ -74,9 +85,14 @@ Result<RehearsalResult> judge_run(const std::string& folder, const std::string& 
     Judge judge(*scenario);
     if (Status read = accept_log(judge, folder + "/emulator/can.log"); !read) return read.error();
     const json before = document(folder + "/result.json");
-    if (!record->contains("wall_s")) (*record)["wall_s"] = 0.0;
-    if (!record->contains("trouble")) (*record)["trouble"] = before.is_object() ? before.value("trouble", "") : "";
-    if (!record->contains("version")) (*record)["version"] = "";
+    const auto is = [&](const char* key, auto is_good) { return record->contains(key) && is_good((*record)[key]); };
+    const auto text = [](const json& v) { return v.is_string(); };
+    if (!is("wall_s", [](const json& v) { return v.is_number(); })) (*record)["wall_s"] = 0.0;
+    if (!is("trouble", text))
+        (*record)["trouble"] = before.is_object() && before.contains("trouble") && text(before["trouble"])
+                                   ? before["trouble"]
+                                   : json("");
+    if (!is("version", text)) (*record)["version"] = "";
     if (!gates.empty()) (*record)["judged_by"] = gates;
     return write_results(*scenario, judge, *record, folder, Pages::all);
 }
@@ -85,7 +101,7 @@ Result<json> judge_campaign(const std::string& folder, const std::string& gates,
     const auto lock = claim_folder(folder, FolderKind::campaign);
     if (!lock) return lock.error();
     json facts = document(folder + "/summary.json");
-    if (!facts.is_object() || !facts.contains("runs") || !facts.contains("each") || facts["each"].empty())
+    if (!states_runs(facts))
         return Error{
             "holds no summary of runs, expected a campaign that has ended: the same `narpa rehearse` command "
             "goes on with it",

@@ -332,6 +332,13 @@ TEST_F(Whole, IsJudgedAnewByOtherGates) {
     ASSERT_TRUE(summary) << summary.error().text();
     EXPECT_EQ((*summary)["failures"]["navigation"].size(), 1u) << summary->dump(1);
     EXPECT_EQ((*summary)["judged_by"], strict);
+    for (const char* forged : {"{}", "[]", R"({"runs": "many", "each": [{"seed": 1, "run": 1}]})",
+                               R"({"runs": 1, "each": [7]})", R"({"runs": 1, "each": [{"seed": -1, "run": 1}]})"}) {
+        ASSERT_TRUE(write_file(o.folder + "/summary.json", forged));
+        const auto refused_summary = judge_campaign(o.folder, strict, kSilent);
+        ASSERT_FALSE(refused_summary) << forged;
+        EXPECT_NE(refused_summary.error().what.find("holds no summary of runs"), std::string::npos);
+    }
 }
 
 /// Passes after a second: no leg has to be flown to its end.

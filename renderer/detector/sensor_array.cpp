@@ -2,21 +2,14 @@
 
 #include <algorithm>
 #include <iterator>
-#include <string_view>
 
 #include "base/each_isa.h"
+#include "base/fnv1a.h"
 #include "renderer/detector/collect.h"
 #include "renderer/detector/pixel_tasks.h"
 
 namespace narpa {
 namespace {
-
-/// FNV-1a, 64 bits.
-std::uint64_t hash(std::string_view text) noexcept {
-    std::uint64_t h = 0xcbf29ce484222325u;
-    for (const char c : text) h = (h ^ static_cast<std::uint8_t>(c)) * 0x100000001b3u;
-    return h;
-}
 
 NARPA_EACH_ISA void write_each(const DetectorConstants& sensor, const SiteConstants& sites, PixelFormat format,
                                std::span<const Rgb> radiance, std::size_t first_pixel, std::uint8_t* out) noexcept {
@@ -40,7 +33,7 @@ std::unique_ptr<SensorArray> SensorArray::create(const ImageSensor& sensor, std:
 }
 
 SensorArray::SensorArray(const ImageSensor& sensor, std::uint64_t seed)
-    : random_(seed ^ hash(sensor.name)), bands_(sites_per_pixel(sensor.format)) {
+    : random_(seed ^ fnv1a(sensor.name)), bands_(sites_per_pixel(sensor.format)) {
     const std::size_t pixels = static_cast<std::size_t>(sensor.width) * static_cast<std::size_t>(sensor.height);
     sites_of_band_ = (pixels + kLanes - 1) / kLanes * kLanes;
     patterns_.sites = bands_ * sites_of_band_;

@@ -42,6 +42,26 @@ nlohmann::json describe(const Scene& scene, const Lidar& l) {
     return lidar;
 }
 
+nlohmann::json describe(const Body& body, const Mark& m) {
+    const Vec3 &p = m.T_body_mark.t, z = m.T_body_mark.q * Vec3{0, 0, 1};
+    const Quat& q = m.T_body_mark.q;
+    nlohmann::json mark{{"name", m.name},
+                        {"body", body.name},
+                        {"kind", std::string(Mark::kKindNames[static_cast<std::size_t>(m.kind)])},
+                        {"position_m", {p.x, p.y, p.z}}};
+    if (m.kind == Mark::Kind::tag) {
+        const std::string_view dictionary = kTagDictionaries[static_cast<std::size_t>(m.dictionary)].name;
+        mark.update({{"dictionary", std::string(dictionary)},
+                     {"id", m.id},
+                     {"side_m", m.side_m},
+                     {"attitude_wxyz", {q.w, q.x, q.y, q.z}}});
+    } else {
+        mark["radius_m"] = m.radius_m;
+        if (!m.is_ball) mark["normal"] = {z.x, z.y, z.z};
+    }
+    return mark;
+}
+
 }  // namespace
 
 Status write_calibration(const Scene& scene, const std::string& folder) {
@@ -51,9 +71,12 @@ Status write_calibration(const Scene& scene, const std::string& folder) {
     nlohmann::json document{
         {"conventions",
          "camera: x right, y down, z forward, centre of the top-left pixel (0, 0); LiDAR: x right, y forward, "
-         "z up; position and attitude take sensor coordinates to the mount's; quaternions w, x, y, z"},
+         "z up; position and attitude take sensor coordinates to the mount's; quaternions w, x, y, z; marks: "
+         "position, "
+         "normal and attitude in their body's axes, of a tag x right, y up, z out of its image"},
         {"cameras", nlohmann::json::array()},
-        {"lidars", nlohmann::json::array()}};
+        {"lidars", nlohmann::json::array()},
+        {"marks", nlohmann::json::array()}};
     for (const Camera& c : scene.cameras) {
         const Result<std::string> text = calibration_text(c.name, {c.width, c.height, c.model});
         if (!text) return text.error();
@@ -61,6 +84,8 @@ Status write_calibration(const Scene& scene, const std::string& folder) {
         if (Status good = write_file(folder + "/" + c.name + ".yaml", *text); !good) return good;
     }
     for (const Lidar& l : scene.lidars) document["lidars"].push_back(describe(scene, l));
+    for (const Body& body : scene.bodies)
+        for (const Mark& mark : body.marks) document["marks"].push_back(describe(body, mark));
     return write_file(folder + "/calibration.json", document.dump(2) + "\n");
 }
 

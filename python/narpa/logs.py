@@ -178,10 +178,37 @@ class Sensor:
         return np.array(self.entries["distortion_coefficients"], float)
 
 
+class Mark:
+    """A lamp, reflector or tag of calibration.json, in the axes of its body."""
+
+    def __init__(self, entries):
+        self.entries = entries
+        self.name, self.body, self.kind = entries["name"], entries["body"], entries["kind"]
+        self.position_m = np.array(entries["position_m"], float)
+
+    def __getitem__(self, key):
+        return self.entries[key]
+
+    @property
+    def corners_m(self):
+        """4 x 3: corners of a tag's black square, clockwise from the top left of its image, as detectors return them."""
+        half = self.entries["side_m"] / 2
+        corners = np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]]) * half
+        return np.array([self.position_m + rotate(self.entries["attitude_wxyz"], corner) for corner in corners])
+
+
+def read_marks(path, body=None):
+    """[Mark, ...] of calibration.json, of all bodies or of one."""
+    return _read(path, lambda document: [Mark(m) for m in document["marks"] if body in (None, m["body"])])
+
+
 def read_calibration(path):
     """{name: Sensor} of calibration.json, which `narpa check SCENE --calibration DIR` writes."""
+    return _read(path, lambda document: {s["name"]: Sensor(s) for s in document["cameras"] + document["lidars"]})
+
+
+def _read(path, take):
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-        return {s["name"]: Sensor(s) for s in document["cameras"] + document["lidars"]}
+        return take(json.loads(Path(path).read_text(encoding="utf-8")))
     except (json.JSONDecodeError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: expected the calibration.json of `narpa check --calibration`: {error}") from None

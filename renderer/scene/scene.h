@@ -19,6 +19,7 @@
 #include "renderer/scene/atmosphere_settings.h"
 #include "renderer/scene/camera.h"
 #include "renderer/scene/course.h"
+#include "renderer/scene/mark.h"
 
 namespace narpa {
 
@@ -52,6 +53,7 @@ struct Body {
     Motion initial{};                        ///< at time 0
     std::shared_ptr<const Course> course{};  ///< null: constant velocity and rate from `initial`
     std::optional<std::uint32_t> can_id{};   ///< base identifier of its pose commands on CAN
+    std::vector<Mark> marks{};
 };
 
 /// Motion of a body without commands.

@@ -27,6 +27,7 @@ constexpr TableKey kBodyRows[]{
     {"rotation", rows::choice<kRotatingBodies>()},
     {"can_id", rows::integer(0, kLastBaseId)},
     {"material", rows::table(kMaterialKeys)},
+    {"mark", rows::tables(kMarkKeys)},
 };
 
 NamedMesh named_mesh(TableReader& table, const std::string& file, std::optional<int> material,
@@ -132,6 +133,7 @@ void read_bodies(TableReader& root, SceneReading& reading) {
         read_rotation(table, body.initial, reading);
         read_orbit(table, body);
         read_can_id(table, body, reading.scene.bodies);
+        read_marks(table, body);
         table.finish();
         reading.scene.bodies.push_back(std::move(body));
     }

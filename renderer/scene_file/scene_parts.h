@@ -59,6 +59,7 @@ extern const TableKeys kSceneKeys, kSunKeys, kAmbientKeys, kStarsKeys, kRenderKe
     kLightKeys, kCameraKeys, kLidarKeys, kAtmosphereKeys;
 extern const TableKeys kMaterialKeys, kDemKeys;  ///< of `material` and `dem` of a body
 extern const TableKeys kOrbitKeys;               ///< of `orbit` of a body
+extern const TableKeys kMarkKeys;                ///< of `mark` of a body
 /// Parts of the keys of cameras: those at the observer, size and projection.
 extern const TableKeys kTrackingKeys, kProjectionKeys;
 /// [scene], [sun], [ambient], [render].
@@ -83,6 +84,8 @@ void read_dem(TableReader& body, int material, SceneReading& reading);
 void load_dems(SceneReading& reading);
 /// `orbit` of a body, which gives its position and velocity; attitude and rate come first.
 void read_orbit(TableReader& table, Body& body);
+/// `mark` of a body.
+void read_marks(TableReader& body_table, Body& body);
 /// [observer]: puts the bodies and the Sun where they are seen; bodies and surroundings come first.
 void read_observer(TableReader& root, SceneReading& reading);
 /// `track` or `azimuth_elevation_deg` of a camera, which put it at the observer.

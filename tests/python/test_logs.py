@@ -82,6 +82,17 @@ class Logs(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "calibration.json: expected"):
             logs.read_calibration(self.folder / "calibration.json")
 
+    def test_marks(self):
+        lamp = {"name": "top", "body": "station", "kind": "lamp", "position_m": [1, 2, 3], "radius_m": 0.1, "normal": [1, 0, 0]}
+        # x right, y up, z out of the image are y, z, x of the body
+        tag = {"name": "t", "body": "board", "kind": "tag", "position_m": [1, 0, 0], "attitude_wxyz": [0.5, 0.5, 0.5, 0.5],
+               "dictionary": "4X4_50", "id": 7, "side_m": 2}  # fmt: skip
+        path = self.folder / "calibration.json"
+        path.write_text(json.dumps({"cameras": [], "lidars": [], "marks": [lamp, tag]}))
+        self.assertEqual([m.name for m in logs.read_marks(path)], ["top", "t"])
+        self.assertEqual([m["radius_m"] for m in logs.read_marks(path, "station")], [0.1])
+        np.testing.assert_allclose(logs.read_marks(path, "board")[0].corners_m, [[1, -1, 1], [1, 1, 1], [1, 1, -1], [1, -1, -1]], atol=1e-12)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -35,6 +35,27 @@ const BadFile kBad[] = {
      "unknown key \"snu\" in the scene; did you mean \"sun\"?"},
     {"UnknownKey", "[sun]\ndirectoin = [1, 0, 0]\n", 2, 1, "unknown key \"directoin\" in [sun]"},
     {"UnknownKeyInBody", BALL "albdeo = 1\n", 4, 1, "unknown key \"albdeo\" in [[body]]"},
+    {"MarkOfNoKind", BALL "[[body.mark]]\nname = \"m\"\nposition_m = [1, 0, 0]\nkind = \"led\"\n", 7, 8, "led"},
+    {"MarkWithoutRadius", BALL "[[body.mark]]\nname = \"m\"\nposition_m = [1, 0, 0]\nkind = \"lamp\"\n", 4, 1,
+     "radius_m"},
+    {"MarkWithKeysOfATag",
+     BALL "[[body.mark]]\nname = \"m\"\nposition_m = [1, 0, 0]\nkind = \"lamp\"\nradius_m = 1\nid = 3\n", 9, 6,
+     "id"},
+    {"TagOfNoDictionary",
+     BALL
+     "mark = [{name = \"t\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, id = 0, attitude_wxyz = [1, 0, 0, "
+     "0],\ndictionary = \"36h11\"}]\n",
+     5, 14, "36h11"},
+    {"TagBeyondItsDictionary",
+     BALL "mark = [{name = \"t\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, attitude_wxyz = [1, 0, 0, "
+          "0],\ndictionary = \"4X4_50\", id = 50}]\n",
+     5, 29, "50 is not in 4X4_50, expected 0 to 49"},
+    {"TwoTagsOfOneNumber",
+     BALL
+     "mark = [{name = \"t\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, attitude_wxyz = [1, 0, 0, "
+     "0], dictionary = \"4X4_50\", id = 5},\n{name = \"u\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, "
+     "attitude_wxyz = [1, 0, 0, 0], dictionary = \"4X4_50\", id = 5}]\n",
+     5, 123, "5 is the number of mark \"t\""},
     {"UnknownKeyInMaterial", BALL "material = {albdeo = 0.5}\n", 4, 13, "did you mean \"albedo\"?"},
     {"UnknownKeyInDetector", CAMERA "fov_diagonal_deg = 9\n[camera.detector]\nbitz = 8\n", 6, 1,
      "did you mean \"bits\"?"},

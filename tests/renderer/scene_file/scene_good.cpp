@@ -45,6 +45,35 @@ TEST(SceneFile, ManualShowsTheCompleteScene) {
     EXPECT_EQ(manual.substr(from, manual.find("```", from) - from), test::read_text(data_file("complete.toml")));
 }
 
+TEST(SceneFile, ReadsMarks) {
+    const Scene s = read_good(data_file("complete.toml"));
+    ASSERT_EQ(s.bodies[0].marks.size(), 3u);
+    EXPECT_TRUE(s.bodies[1].marks.empty());
+    const Mark &lamp = s.bodies[0].marks[0], &mirror = s.bodies[0].marks[1], &tag = s.bodies[0].marks[2];
+    EXPECT_EQ(lamp.name, "lamp");
+    EXPECT_EQ(lamp.radius_m, 0.02);
+    EXPECT_FALSE(lamp.is_ball);
+    expect_close(lamp.T_body_mark * Vec3{0, 0, 1}, {2, 0, 0.5}, 1e-15);  // its normal is the mark's z
+    EXPECT_EQ(mirror.kind, Mark::Kind::reflector);
+    EXPECT_TRUE(mirror.is_ball);
+    EXPECT_EQ(kTagDictionaries[static_cast<std::size_t>(tag.dictionary)].name, "APRILTAG_36h11");
+    EXPECT_EQ(tag.id, 586);
+    EXPECT_EQ(tag.side_m, 0.4);
+    expect_close(tag.T_body_mark.q * Vec3{1, 0, 0}, {0, 1, 0}, 1e-15);
+}
+
+TEST(SceneFile, MarksFaceAnyDirection) {
+    for (const Vec3& n : {Vec3{0, 0, 1}, Vec3{0, 0, -1}, Vec3{1e-9, 0, -1}, Vec3{-3, 0, 0}, Vec3{1, 2, -2}}) {
+        const Scene m =
+            read_good_text(std::string(kSphere) +
+                           "mark = [{name = \"a\", kind = \"lamp\", radius_m = 1, position_m = [0, 0, 0], "
+                           "normal = [" +
+                           std::to_string(n.x) + ", " + std::to_string(n.y) + ", " + std::to_string(n.z) + "]}]\n" +
+                           kCamera + "[ambient]\nradiance = 1\n");
+        expect_close(m.bodies[0].marks.at(0).T_body_mark.q * Vec3{0, 0, 1}, normalized(n), 1e-6);
+    }
+}
+
 TEST(SceneFile, ReadsSurroundings) {
     const Scene s = read_good(data_file("complete.toml"));
     EXPECT_EQ(s.name, "every key");

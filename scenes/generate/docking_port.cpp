@@ -182,10 +182,34 @@ void hatch_and_target(Mesh& mesh) {
     mesh.material("target_white");
     for (const bool upright : {true, false})
         box(mesh, {{}, {kStandOffX, 0, 0}}, upright ? Vec3{0.006, 0.010, 0.075} : Vec3{0.005, 0.075, 0.010}, 0.001);
-    mesh.begin("port_lights", "lamp");
-    for (int k = 0; k < 8; ++k) {  // four near the target, four at the rim
-        const double angle = k * kPi / 4, r = k % 2 ? 0.452 : 0.245;
-        lathe(mesh, {{}, polar(front, r, angle)}, {{-0.01, 0}, {-0.01, 0.012}, {0.02, 0.009}, {0.02, 0}}, 20);
+}
+
+/// A lamp whose bright disc of this radius faces the chaser, on a wide black housing: from every side its centre is
+/// the optical centre, and nothing bright is seen beside it.
+void lamp(Mesh& mesh, const Vec3& optical_centre, double radius, double depth) {
+    constexpr double kDisc = 0.0005, kHousing = 1.8;
+    mesh.material("black");
+    lathe(mesh, {{}, optical_centre},
+          {{-depth, 0}, {-depth, kHousing * radius}, {-kDisc, kHousing * radius}, {-kDisc, 0}}, 24);
+    mesh.material("lamp");
+    lathe(mesh, {{}, optical_centre}, {{-kDisc, 0}, {-kDisc, radius}, {0, radius}, {0, 0}}, 24);
+}
+
+/// The marks that a camera navigates by: small lamps on the hatch for the last metres, large ones on posts around
+/// the port, in three planes, for the approach. The scenes state their optical centres.
+void lights(Mesh& mesh) {
+    mesh.begin("port_lights", "dark_grey");
+    for (int k = 0; k < 8; ++k)  // four near the target, four on the hatch's ring
+        lamp(mesh, k % 2 ? polar(-0.404, 0.452, k * kPi / 4) : polar(-0.412, 0.245, k * kPi / 4), 0.012, 0.02);
+    struct Post {
+        double x, angle_deg;
+    };
+    for (const auto& [x, angle_deg] : {Post{-0.10, 36}, Post{-0.40, 104}, Post{-0.10, 150}, Post{-0.40, 216},
+                                       Post{-0.10, 262}, Post{-0.25, 322}}) {
+        const double angle = angle_deg * kPi / 180;
+        mesh.material("aluminium");
+        tube(mesh, polar(-0.55, 0.95, angle), polar(x - 0.03, 1.12, angle), 0.02, 10);
+        lamp(mesh, polar(x, 1.12, angle), 0.035, 0.05);
     }
 }
 
@@ -219,6 +243,7 @@ void add_docking_port(Mesh& mesh) {
     rings(mesh);
     petals_and_latches(mesh);
     hatch_and_target(mesh);
+    lights(mesh);
 }
 
 }  // namespace narpa::scenes

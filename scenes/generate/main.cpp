@@ -1,5 +1,5 @@
-/// make_scene docking|craft|descent|small_body|landing|terrain OUTDIR - writes the meshes, textures and tables of a
-/// scene. The same bytes each time.
+/// make_scene docking|craft|descent|small_body|tag_board|landing|terrain OUTDIR - writes the meshes, textures and
+/// tables of a scene. The same bytes each time.
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -35,6 +35,8 @@ bool write_scene(std::string_view scene, const Output& out) {
         write_ground_texture(out.directory);
     } else if (scene == "small_body") {
         out.mesh("small_body", build_small_body(), small_body_materials());
+    } else if (scene == "tag_board") {
+        out.mesh("tag_board", build_tag_board(), tag_board_materials());
     } else if (scene == "landing") {
         out.mesh("landing_site", build_landing_site(), landing_materials());
         out.mesh("landing_map", build_landing_map(), landing_materials());
@@ -57,7 +59,9 @@ int main(int argc, char** argv) {
         std::fprintf(stderr, "make_scene: %s\n", e.what());
         return 1;
     }
-    std::fputs("usage: make_scene docking|craft|descent|small_body|landing|terrain OUTDIR   (an existing folder)\n",
-               stderr);
+    std::fputs(
+        "usage: make_scene docking|craft|descent|small_body|tag_board|landing|terrain OUTDIR   (an existing "
+        "folder)\n",
+        stderr);
     return 2;
 }

@@ -53,6 +53,11 @@ std::vector<MaterialSpec> small_body_materials();
 /// Closed; about 0.4 m between vertices.
 Mesh build_small_body();
 
+// --- Tag board: four square tags and five reflectors on a board of 0.92 m that faces x, z up ---
+
+std::vector<MaterialSpec> tag_board_materials();
+Mesh build_tag_board();
+
 // --- Landing site: cratered ground with rocks about a clear place, a few hundredths of the distance from it
 // between vertices. Origin on the ground at the site, z up. And a lander with four feet: origin in its middle, z up
 // ---

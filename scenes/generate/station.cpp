@@ -131,7 +131,7 @@ std::vector<MaterialSpec> scene_materials() {
         {"ring_face", {0.55, 0.55, 0.56}, {0.20, 0.20, 0.20}, 18, "ring.png"},
         {"black", {0.03, 0.03, 0.03}},
         {"target_white", {0.70, 0.70, 0.70}, {}, 1, {}, {45, 45, 45}},  // edge-lit, so that it is seen in shadow
-        {"lamp", {0.80, 0.80, 0.80}, {}, 1, {}, {250, 250, 240}},
+        {"lamp", {0.05, 0.05, 0.05}, {}, 1, {}, {320, 320, 307}},       // as bright in shadow as in sunlight
     };
 }
 

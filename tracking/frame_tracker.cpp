@@ -98,6 +98,7 @@ Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, s
     const Camera& c = world.scene().cameras[camera];
     const auto target = target_of(world, c.mount, c.name, options.target);
     if (!target) return target.error();
+    if (Status good = check_method(*options.method, world.scene(), *target); !good) return good.error();
     return std::unique_ptr<FrameTracker>(new FrameTracker(world, camera, *target, options));
 }
 

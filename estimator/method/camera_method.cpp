@@ -1,10 +1,13 @@
 #include "estimator/method/camera_method.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
+#include "estimator/marks/mark_alignment.h"
 
 namespace narpa {
 namespace {
@@ -86,13 +89,40 @@ private:
     std::optional<FeatureEstimator> features_;
 };
 
+class MarkEstimator final : public FrameEstimator {
+public:
+    MarkEstimator(const RenderScene& render_scene, const Camera& camera, std::size_t target,
+                  const FrameEstimatorSettings& s)
+        : alignment_(render_scene, camera, target, s.model) {}
+
+    Result<FramePose> estimate(const FrameInput& f) override {
+        const MarkEstimate e = alignment_.align(f.image, f.guess, f.motion);
+        bound_ = e.bound;
+        return FramePose{e.T_camera_target, e.covariance, e.covariance_of_model, e.answer, e.marks, 0};
+    }
+    Result<Matrix6> bound(const FrameInput&, const Rigid3&) override { return bound_; }
+    void set_detector(const Detector& detector) override { alignment_.set_detector(detector); }
+
+private:
+    MarkAlignment alignment_;
+    Matrix6 bound_ = Matrix6::Zero();
+};
+
 template <class Estimator>
 std::unique_ptr<FrameEstimator> make(const RenderScene& render_scene, const Camera& camera, std::size_t target,
                                      const FrameEstimatorSettings& settings) {
     return std::make_unique<Estimator>(render_scene, camera, target, settings);
 }
 
-constexpr std::array<CameraMethod, 2> kMethods{
+Status needs_marks(const Scene& scene, std::size_t target) {
+    const Body& body = scene.bodies[target];
+    if (!body.marks.empty()) return Ok{};
+    return Error{
+        fmt::format("body \"{}\" has no marks, expected [[body.mark]] for the method \"marks\"", body.name),
+        scene.file};
+}
+
+constexpr std::array<CameraMethod, 3> kMethods{
     {{.name = "features",
       .measures = "points",
       .help = "points of the frame and of a render",
@@ -105,7 +135,14 @@ constexpr std::array<CameraMethod, 2> kMethods{
       .measures = "all pixels",
       .help = "all pixels, starting from the features' pose",
       .takes_frame_noise = true,
-      .make = make<DenseEstimator>}}};
+      .make = make<DenseEstimator>},
+     {.name = "marks",
+      .measures = "marks",
+      .help = "lamps, reflectors and tags that the scene states for the target",
+      // In frames sampled at the centres of pixels, marks at the same places between them have the same errors.
+      .variance_between_frames = 2,
+      .needs = needs_marks,
+      .make = make<MarkEstimator>}}};
 
 }  // namespace
 
@@ -116,6 +153,10 @@ std::span<const CameraMethod> camera_methods() noexcept {
 const CameraMethod* find_camera_method(std::string_view name) noexcept {
     const auto found = std::ranges::find(kMethods, name, &CameraMethod::name);
     return found == kMethods.end() ? nullptr : &*found;
+}
+
+Status check_method(const CameraMethod& method, const Scene& scene, std::size_t target) {
+    return method.needs ? method.needs(scene, target) : Status{Ok{}};
 }
 
 std::string help_of_camera_methods() {

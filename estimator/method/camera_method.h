@@ -75,6 +75,8 @@ struct CameraMethod {
     bool light_is_that_of_the_guess = false;
     /// Factor on the variance of an error for filters, which take errors of consecutive frames as independent.
     double variance_between_frames = 1;
+    /// Null, or what is wrong with a target that the method cannot use.
+    Status (*needs)(const Scene& scene, std::size_t target) = nullptr;
     /// `render_scene` outlives the estimator. `target`: index of the body.
     std::unique_ptr<FrameEstimator> (*make)(const RenderScene& render_scene, const Camera& camera,
                                             std::size_t target, const FrameEstimatorSettings& settings);
@@ -82,6 +84,8 @@ struct CameraMethod {
 
 /// The first is the default.
 [[nodiscard]] std::span<const CameraMethod> camera_methods() noexcept;
+/// An Error where the method cannot estimate this body's pose.
+[[nodiscard]] Status check_method(const CameraMethod& method, const Scene& scene, std::size_t target);
 /// Null where there is none of this name.
 [[nodiscard]] const CameraMethod* find_camera_method(std::string_view name) noexcept;
 /// "NAME: HELP; NAME: HELP".

@@ -11,8 +11,11 @@ Result<std::unique_ptr<Autopilot>> Autopilot::create(const Scenario& scenario, s
     auto model = SceneModel::create(scenario);
     if (!model) return model.error();
     a->model_ = *std::move(model);
+    const CameraMethod& method = *scenario.navigation.camera_method;
+    if (!a->model_->cameras().empty())
+        if (Status good = check_method(method, a->model_->scene(), a->model_->target()); !good) return good.error();
     for (const std::size_t camera : a->model_->cameras())
-        a->cameras_.emplace_back(*a->model_, camera, *scenario.navigation.camera_method, seed);
+        a->cameras_.emplace_back(*a->model_, camera, method, seed);
     for (const std::size_t lidar : a->model_->lidars()) a->lidars_.emplace_back(*a->model_, lidar);
     for (const std::size_t lidar : a->model_->velocimeters())
         a->velocimeters_.emplace_back(*a->model_, lidar, scenario.navigation);

@@ -5,6 +5,7 @@
 #include "protocols/video/embedded_line.h"
 #include "rehearsal/navigation/estimation/measurements.h"
 #include "rehearsal/navigation/sensor_inputs.h"
+#include "renderer/scene_file/scene_file.h"
 #include "tests/rehearsal/simulated_sensors.h"
 #include "tests/support/paths.h"
 
@@ -83,6 +84,19 @@ TEST_P(CameraMethods, MeasureTheTruePose) {
         const Vector6 error = error_between(s.pose->T_sensor_target, T_camera_target);
         EXPECT_LT(normalised_error_squared(error, s.pose->covariance), 27.9) << x_m;
         EXPECT_LT(error.tail<3>().norm(), GetParam().part_of_range * x_m);
+    }
+}
+
+// The scenes are written by hand, each with the marks of the one station.
+TEST(Marks, OfBothDockingScenesAreTheSame) {
+    const auto docking = read_scene(test::build_path("scenes/docking/docking.toml"));
+    ASSERT_TRUE(docking) << docking.error().text();
+    const std::vector<Mark> &a = docking->bodies[0].marks, &b = stage().model->scene().bodies[0].marks;
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        EXPECT_EQ(a[i].name, b[i].name);
+        EXPECT_EQ(norm(a[i].T_body_mark.t - b[i].T_body_mark.t), 0) << a[i].name;
+        EXPECT_EQ(a[i].radius_m, b[i].radius_m) << a[i].name;
     }
 }
 

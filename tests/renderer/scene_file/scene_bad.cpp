@@ -23,6 +23,9 @@ std::string completed(std::string text) {
 #define CAMERA "[[camera]]\nname = \"c\"\nresolution = [64, 48]\n"
 #define BODY "[[body]]\nname = \"x\"\n"
 #define BALL BODY "sphere = {radius_m = 1}\n"
+#define TAG(name)                   \
+    "[[body.mark]]\nname = \"" name \
+    "\"\nkind = \"tag\"\nposition_m = [1, 0, 0]\nside_m = 1\nattitude_wxyz = [1, 0, 0, 0]\n"
 #define PLANET BODY "sphere = {radius_m = 6371000}\n"
 #define FIELD "fov_diagonal_deg = 9\n"
 #define LIDAR "[[lidar]]\nname = \"l\"\n"
@@ -41,21 +44,12 @@ const BadFile kBad[] = {
     {"MarkWithKeysOfATag",
      BALL "[[body.mark]]\nname = \"m\"\nposition_m = [1, 0, 0]\nkind = \"lamp\"\nradius_m = 1\nid = 3\n", 9, 6,
      "id"},
-    {"TagOfNoDictionary",
-     BALL
-     "mark = [{name = \"t\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, id = 0, attitude_wxyz = [1, 0, 0, "
-     "0],\ndictionary = \"36h11\"}]\n",
-     5, 14, "36h11"},
-    {"TagBeyondItsDictionary",
-     BALL "mark = [{name = \"t\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, attitude_wxyz = [1, 0, 0, "
-          "0],\ndictionary = \"4X4_50\", id = 50}]\n",
-     5, 29, "50 is not in 4X4_50, expected 0 to 49"},
+    {"TagOfNoDictionary", BALL TAG("t") "id = 0\ndictionary = \"36h11\"\n", 11, 14, "36h11"},
+    {"TagBeyondItsDictionary", BALL TAG("t") "dictionary = \"4X4_50\"\nid = 50\n", 11, 6,
+     "50 is not in 4X4_50, expected 0 to 49"},
     {"TwoTagsOfOneNumber",
-     BALL
-     "mark = [{name = \"t\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, attitude_wxyz = [1, 0, 0, "
-     "0], dictionary = \"4X4_50\", id = 5},\n{name = \"u\", kind = \"tag\", position_m = [1, 0, 0], side_m = 1, "
-     "attitude_wxyz = [1, 0, 0, 0], dictionary = \"4X4_50\", id = 5}]\n",
-     5, 123, "5 is the number of mark \"t\""},
+     BALL TAG("t") "dictionary = \"4X4_50\"\nid = 5\n" TAG("u") "dictionary = \"4X4_50\"\nid = 5\n", 19, 6,
+     "5 is the number of mark \"t\""},
     {"UnknownKeyInMaterial", BALL "material = {albdeo = 0.5}\n", 4, 13, "did you mean \"albedo\"?"},
     {"UnknownKeyInDetector", CAMERA "fov_diagonal_deg = 9\n[camera.detector]\nbitz = 8\n", 6, 1,
      "did you mean \"bits\"?"},

@@ -17,10 +17,11 @@ void SceneArgument::add_settings_to(Parser app) {
     add_strict_to(app);
 }
 
-void SceneArgument::add_set_to(Parser app, std::vector<std::string>& sets) {
-    app.option("--set", sets,
-               "Value of a key in place of the file's, as camera.nav.detector.exposure_s=0.002; may be given many "
-               "times")
+Option SceneArgument::add_set_to(Parser app, std::vector<std::string>& sets) {
+    return app
+        .option("--set", sets,
+                "Value of a key in place of the file's, as camera.nav.detector.exposure_s=0.002; may be given many "
+                "times")
         .type_name("KEY=VALUE")
         .values(1, 1)
         .repeatable();

@@ -19,7 +19,7 @@ struct SceneArgument {
     void add_to(Parser app);
     /// Adds --set and --strict.
     void add_settings_to(Parser app);
-    static void add_set_to(Parser app, std::vector<std::string>& sets);
+    static Option add_set_to(Parser app, std::vector<std::string>& sets);
     /// Reads the scene, with another method than its own if one is given, and prints its warnings; with --strict
     /// they are an Error.
     [[nodiscard]] Result<Scene> load(std::optional<RenderSettings::Method> method = {}) const;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "protocols/video/embedded_line.h"
+#include "renderer/light/air_for_lidar.h"
 
 namespace narpa {
 
@@ -24,11 +25,21 @@ Status check_camera(const Camera& c, const std::string& file) {
 }  // namespace
 
 Result<std::unique_ptr<World>> World::create(Scene scene) {
+    return create(std::move(scene), false);
+}
+
+Result<std::unique_ptr<World>> World::create_for_lidars(Scene scene) {
+    return create(std::move(scene), true);
+}
+
+Result<std::unique_ptr<World>> World::create(Scene scene, bool for_lidars) {
     for (const Camera& c : scene.cameras)
         if (auto good = check_camera(c, scene.file); !good) return good.error();
     std::unique_ptr<World> world(new World);
     world->scene_ = std::move(scene);
-    auto render_scene = RenderScene::create(world->scene_);
+    auto render_scene =
+        RenderScene::create(world->scene_, 0, nullptr,
+                            for_lidars && world->scene_.atmosphere ? air_for_lidars_alone(world->scene_) : nullptr);
     if (!render_scene) return render_scene.error();
     world->render_scene_.emplace(*std::move(render_scene));
 

@@ -26,6 +26,8 @@ class World {
 public:
     /// Builds the tracer and the tracks.
     static Result<std::unique_ptr<World>> create(Scene scene);
+    /// The same for LiDARs alone: air is that at their wavelength, without the tables that images need.
+    static Result<std::unique_ptr<World>> create_for_lidars(Scene scene);
 
     [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
     [[nodiscard]] const RenderScene& render_scene() const noexcept { return *render_scene_; }
@@ -63,6 +65,7 @@ public:
 
 private:
     World() = default;
+    static Result<std::unique_ptr<World>> create(Scene scene, bool for_lidars);
     void find_moving();
     [[nodiscard]] TrackedPose pose(std::size_t body, std::int64_t t_ns) const noexcept;
 

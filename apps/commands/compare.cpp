@@ -30,6 +30,11 @@ struct CompareOptions {
     std::optional<double> min_overlap, min_correlation, max_shift_px;
 };
 
+/// Why the shift is not determined; empty: it is.
+std::string why_no_shift(const FrameComparison& c) {
+    return c.shift ? c.shift->not_determined : "the render is uniform";
+}
+
 /// The limits that the comparison does not meet, a sentence each.
 std::vector<std::string> faults_of(const FrameComparison& c, const CompareOptions& o) {
     std::vector<std::string> faults;
@@ -41,11 +46,13 @@ std::vector<std::string> faults_of(const FrameComparison& c, const CompareOption
                                      c.correlation ? fmt::format("{:.4f}", *c.correlation) : "not known",
                                      *o.min_correlation));
     if (!o.max_shift_px) return faults;
+    const std::string why_none = why_no_shift(c);
     const double shift_px = c.shift ? std::hypot(c.shift->x_px, c.shift->y_px) : 0;
-    if (!c.shift || c.shift->is_at_limit || shift_px > *o.max_shift_px)
+    if (!why_none.empty() || c.shift->is_at_limit || shift_px > *o.max_shift_px)
         faults.push_back(fmt::format(
             "shift {}, expected at most {:g} px",
-            c.shift ? fmt::format("{:.2f} px{}", shift_px, c.shift->is_at_limit ? " or more" : "") : "not known",
+            why_none.empty() ? fmt::format("{:.2f} px{}", shift_px, c.shift->is_at_limit ? " or more" : "")
+                             : "not determined",
             *o.max_shift_px));
     return faults;
 }
@@ -67,10 +74,15 @@ nlohmann::json numbers_of(const FrameComparison& c) {
                             {"mean_dn", c.mean_dn},
                             {"residual_dn", c.residual_dn},
                             {"residual_over_noise", or_null(c.residual_noise)},
-                            {"shift", nullptr}};
-    if (c.shift)
+                            {"shift", nullptr},
+                            {"shift_not_determined", nullptr}};
+    if (const std::string why_none = why_no_shift(c); !why_none.empty())
+        document["shift_not_determined"] = why_none;
+    else
         document["shift"] = {{"x_px", c.shift->x_px},
                              {"y_px", c.shift->y_px},
+                             {"sigma_x_px", c.shift->sigma_x_px},
+                             {"sigma_y_px", c.shift->sigma_y_px},
                              {"correlation", c.shift->correlation},
                              {"is_at_limit", c.shift->is_at_limit}};
     return document;
@@ -86,13 +98,15 @@ std::string words_of(const FrameComparison& c) {
         c.correlation ? fmt::format(", correlation {:.4f}", *c.correlation) : ", uniform", c.residual_dn,
         100 * c.residual_dn / c.mean_dn,
         c.residual_noise ? fmt::format(", {:.3g} times the noise of detector and samples", *c.residual_noise) : "");
-    if (!c.shift) return out + "  shift: not known, the render is uniform";
-    return out + fmt::format(
-                     "  shift: the frame shows it {:.2f} px further {} and {:.2f} px further {} than the render{}, "
-                     "correlation {:.4f} there",
-                     std::abs(c.shift->x_px), c.shift->x_px < 0 ? "left" : "right", std::abs(c.shift->y_px),
-                     c.shift->y_px < 0 ? "up" : "down", c.shift->is_at_limit ? ", or more" : "",
-                     c.shift->correlation);
+    if (const std::string why_none = why_no_shift(c); !why_none.empty())
+        return out + "  shift: not determined, " + why_none;
+    return out +
+           fmt::format(
+               "  shift: the frame shows it {:.2f} +- {:.2f} px further {} and {:.2f} +- {:.2f} px further {} "
+               "than the render{}, correlation {:.4f} there",
+               std::abs(c.shift->x_px), c.shift->sigma_x_px, c.shift->x_px < 0 ? "left" : "right",
+               std::abs(c.shift->y_px), c.shift->sigma_y_px, c.shift->y_px < 0 ? "up" : "down",
+               c.shift->is_at_limit ? ", or more" : "", c.shift->correlation);
 }
 
 /// The document of the picture (python/narpa/plots/estimation.py): both images at the frame's brightness, and the
@@ -225,7 +239,10 @@ Command add_compare(Parser app) {
               .range(0.0, 1.0),
           c.option("--min-correlation", o->min_correlation, "Least correlation of their brightness")
               .range(-1.0, 1.0),
-          c.option("--max-shift", o->max_shift_px, "Largest shift of the target").type_name("PX").range(0.0, 32.0)})
+          c.option("--max-shift", o->max_shift_px,
+                   "Largest shift of the target; one that is not determined fails too")
+              .type_name("PX")
+              .range(0.0, 32.0)})
         (void)option.group("Limits: exit status 1 where one is missed");
     c.examples({"narpa compare docking --frame out/frame.png -o out/residuals.png",
                 "narpa compare docking --frame out/frame.png --frame-spp 1 --min-overlap 0.95 --max-shift 0.5"});

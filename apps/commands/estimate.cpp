@@ -9,17 +9,16 @@
 #include <random>
 
 #include "apps/cli.h"
+#include "apps/commands/estimate_run.h"
 #include "apps/commands/sweep_file.h"
 #include "apps/scene_argument.h"
 #include "apps/scene_options.h"
 #include "apps/warnings.h"
-#include "base/write_file.h"
-#include "emulator/log/run_record.h"
-#include "emulator/replay/replay.h"
 #include "emulator/threads.h"
 #include "estimator/cloud/cloud_icp.h"
-#include "estimator/cloud/range_points.h"
+#include "estimator/cloud/own_body.h"
 #include "estimator/search/cloud_search.h"
+#include "estimator/uncertainty/observed_error.h"
 #include "estimator/view/measured_image.h"
 #include "renderer/keys/shipped_file.h"
 #include "renderer/scene_file/scene_file.h"
@@ -31,102 +30,19 @@ namespace {
 struct EstimateOptions {
     std::string input;
     std::vector<std::string> sets;  ///< of the scene
-    std::string sensor;             ///< the sensor's name; empty: the first
     TrackerFlags tracker;
-    int threads = 0;
-
-    // Of a logged run
-    std::string scene, csv, picture;
-    int every = 1;
+    RunEstimate run;  ///< of a logged run; its sensor and threads hold for a file too
 
     // Of a single file. Scene, trajectory and --pose give the truth, or with `no_truth` the initial guess. Without
     // `no_truth`, the guess is the truth displaced.
     std::string frame, sweep;  ///< an image or FILE.raw; FILE.pcap
     double time_s = 0;
-    std::string unit;          ///< of the sweep's capture; empty: it holds packets of one
-    double range_noise_m = 0;  ///< of the sweep, standard deviation; 0: the scene's
-    bool no_truth = false;     ///< the poses are a guess
+    std::string unit;       ///< of the sweep's capture; empty: it holds packets of one
+    bool no_truth = false;  ///< the poses are a guess
     PoseOptions pose;
 
     std::vector<Option> only_of_files, only_of_logs, only_of_frames, only_of_sweeps;
 };
-
-/// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
-Result<std::vector<TrackedFrame>> track(const EstimateOptions& o, Replay& run, FrameTracker& tracker) {
-    TracingThreads threads(o.threads);
-    Progress progress("estimating poses of " + o.input);
-    std::vector<TrackedFrame> tracked;
-    for (std::size_t i = 0; i < run.frames().size(); i += static_cast<std::size_t>(o.every)) {
-        progress.show(static_cast<double>(i) / static_cast<double>(run.frames().size()),
-                      fmt::format("frame {} of {}", i + 1, run.frames().size()));
-        const FrameLedger& ledger = run.frames()[i].ledger;
-        if (!run.has_image(i) || ledger.delivery != Delivery::frame) continue;
-        std::vector<std::string> differs;
-        threads.arena.execute([&] {
-            differs = run.make(i);
-            tracked.push_back(tracker.take(ledger, run.bytes(), run.placement(i)));
-        });
-        if (!differs.empty())
-            return Error{
-                fmt::format("frame {} is not the run's any more: {}; expected the scene and the program as they "
-                            "were",
-                            ledger.frame, differs.front()),
-                o.input + "/" + run.camera().name + ".ledger.csv", run.frames()[i].line};
-    }
-    return tracked;
-}
-
-Status write_rows(const std::string& path, const std::vector<TrackedFrame>& tracked) {
-    std::string rows = std::string(kEstimateHeader) + '\n';
-    for (const TrackedFrame& f : tracked) rows += estimate_row(f);
-    return write_file(path, rows);
-}
-
-/// A log has a row of each sweep, not its packets; a run in lockstep makes them again.
-Status check_no_lidar(const EstimateOptions& o) {
-    const auto record = read_run_record(o.input);
-    if (!record) return Ok{};  // Replay::open reports it
-    const auto scene = read_scene(o.scene.empty() ? record->scene_file : o.scene);
-    if (!scene || std::ranges::find(scene->lidars, o.sensor, &Lidar::name) == scene->lidars.end()) return Ok{};
-    return Error{
-        fmt::format("holds no packets of LiDAR \"{0}\": make them again by `narpa run {1} --can "
-                    "log:{2}/can.log --lockstep --lidar {0}={0}.pcap`, then `narpa estimate {1} --lidar {0} "
-                    "--sweep {0}.pcap --trajectory {2}/CAMERA.truth.csv`, with the log's name of a camera",
-                    o.sensor, scene->file, o.input),
-        o.input};
-}
-
-Outcome estimate_log(const EstimateOptions& o, const TrackerOptions& tracker_options) {
-    if (!o.sensor.empty())
-        if (Status good = check_no_lidar(o); !good) return good.error();
-    auto run = Replay::open(o.input, o.sensor, o.scene);
-    if (!run) return run.error();
-    auto tracker = FrameTracker::create((*run)->world(), (*run)->camera_index(), tracker_options);
-    if (!tracker) return tracker.error();
-    auto tracked = track(o, **run, **tracker);
-    if (!tracked) return tracked.error();
-    const Scene& scene = (*run)->world().scene();
-    const std::string target = scene.bodies[(*tracker)->target()].name;
-    const std::string_view method = tracker_options.method->name;
-    const EstimateSummary summary = summarise(*tracked);
-    say(fmt::format("{}: camera {}, target {}, by {}: {}", o.input, (*run)->camera().name, target, method,
-                    to_text(summary)));
-    if (!o.csv.empty())
-        if (auto written = write_rows(o.csv, *tracked); !written) return written.error();
-    if (!o.picture.empty()) {
-        const std::string title =
-            fmt::format("{}: {} seen by {}, by {}", scene.name, target, (*run)->camera().name, method);
-        if (auto written = plot_estimates(o.picture, title, *tracked); !written) return written.error();
-    }
-    for (const std::string& file : {o.csv, o.picture})
-        if (!file.empty()) say("wrote " + file);
-    return nlohmann::json{{"passed", summary.measured > 0},
-                          {"log", o.input},
-                          {"camera", (*run)->camera().name},
-                          {"target", target},
-                          {"method", method},
-                          {"summary", to_json(summary)}};
-}
 
 // --- One frame or one sweep in a file ---------------------------------------------------------------------------
 
@@ -134,7 +50,7 @@ Result<std::unique_ptr<World>> world_of(const EstimateOptions& o, std::int64_t t
     auto scene = SceneArgument{o.input, o.sets}.load();
     if (!scene) return scene.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
-    auto world = World::create(*std::move(scene));
+    auto world = o.sweep.empty() ? World::create(*std::move(scene)) : World::create_for_lidars(*std::move(scene));
     if (!world) return world;
     if (auto loaded = o.pose.load(**world, t_ns, until_ns); !loaded) return loaded.error();
     return world;
@@ -151,7 +67,8 @@ struct Estimated {
 nlohmann::json show(const Estimated& of, const Rigid3& T, const Matrix6& covariance, const Matrix6& bound,
                     const Answer& answer) {
     const Vector6 error = error_between(T, of.known);
-    const double nees = normalised_error_squared(error, covariance);
+    const ObservedError nees = observed_error(T, covariance, answer, of.known);
+    const NeesBand band = nees_band(nees.freedom);
     const Rigid3 in_world = of.T_world_sensor * T;
     say(fmt::format("{} in {} {}: position ({:.6g}, {:.6g}, {:.6g}) m, attitude ({:.7f}, {:.7f}, {:.7f}, {:.7f})",
                     of.target, of.sensor_kind, of.sensor, T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z));
@@ -163,8 +80,9 @@ nlohmann::json show(const Estimated& of, const Rigid3& T, const Matrix6& covaria
             of.target, in_world.t.x, in_world.t.y, in_world.t.z, in_world.q.w, in_world.q.x, in_world.q.y,
             in_world.q.z));
     else
-        say(fmt::format("  off the truth by {}; NEES {:.2f}, 6 expected, 95 % band {:g} to {:g}; {}", off, nees,
-                        kNeesLow, kNeesHigh, nees_verdict(nees, kNeesLow, kNeesHigh)));
+        say(fmt::format("  off the truth by {}; NEES {:.2f}, {} expected, 95 % band {:g} to {:g}; {}", off,
+                        nees.squared, nees.freedom, band.low, band.high,
+                        nees_verdict(nees.squared, band.low, band.high)));
     say(fmt::format("  standard deviations {:.3g} deg, {:.3g} m; bound {:.3g} deg, {:.3g} m",
                     rotation_sigma(covariance) / kDegree, position_sigma(covariance),
                     rotation_sigma(bound) / kDegree, position_sigma(bound)));
@@ -185,27 +103,14 @@ nlohmann::json show(const Estimated& of, const Rigid3& T, const Matrix6& covaria
                             {of.known_is_guess ? "guess" : "truth", to_json(of.known)}};
     if (of.known_is_guess) return document;
     document["error_rotation_rad"] = error.head<3>().norm(), document["error_position_m"] = error.tail<3>().norm();
-    document["nees"] = std::isfinite(nees) ? nlohmann::json(nees) : nlohmann::json(nullptr);
+    document["nees"] = std::isfinite(nees.squared) ? nlohmann::json(nees.squared) : nlohmann::json(nullptr);
+    document["nees_expected"] = nees.freedom;
     return document;
 }
 
-/// Removes the points on the body that carries the LiDAR, whose place is known, and the beams without return that
-/// meet it.
-void remove_own_body(LidarSweep& sweep, const World& world, const Lidar& lidar, const BodyPoses& at) {
-    const Rigid3 T_world_lidar = world.sensor_pose(lidar.mount, lidar.T_mount_lidar, at);
-    constexpr double kAlike_m = 0.1;
-    const auto first_hit = [&](const auto& beam, double max_m) {
-        return world.tracer().intersect(at, {T_world_lidar * beam.origin_m, T_world_lidar.q * beam.direction},
-                                        max_m);
-    };
-    std::erase_if(sweep.points, [&](const RangePoint& p) {
-        const Hit hit = first_hit(p, p.range_m + kAlike_m);
-        return hit.body >= 0 && hit.body == lidar.mount && hit.range_m > p.range_m - kAlike_m;
-    });
-    std::erase_if(sweep.empty, [&](const EmptyBeam& b) {
-        const Hit hit = first_hit(b, lidar.range_max_m);
-        return hit.body >= 0 && hit.body == lidar.mount;
-    });
+nlohmann::json no_pose(const std::string& file, const Answer& answer, const std::string& why) {
+    say(fmt::format("{} gives no pose: {}: {}", file, kAnswerKinds[static_cast<std::size_t>(answer.kind)], why));
+    return {{"passed", false}, {"answer", to_json(answer)}};
 }
 
 /// Ledger of a frame with the exposure of the scene.
@@ -224,7 +129,7 @@ Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
     auto world = world_of(o, t_ns, t_ns);
     if (!world) return world.error();
     const Scene& scene = (*world)->scene();
-    const auto camera = sensor_named(scene.cameras, o.sensor, "camera", scene.file);
+    const auto camera = sensor_named(scene.cameras, o.run.sensor, "camera", scene.file);
     if (!camera) return camera.error();
     const auto target =
         target_of(**world, scene.cameras[*camera].mount, scene.cameras[*camera].name, options.target);
@@ -237,7 +142,7 @@ Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
     (*world)->place(t_ns, scene.cameras[*camera].mount, at);
     const Rigid3 T_world_camera = (*world)->camera_pose(scene.cameras[*camera], o.time_s, at);
     if (o.no_truth) options.guess = inverse(T_world_camera) * at.T_world_body[*target];
-    TracingThreads threads(o.threads);
+    TracingThreads threads(o.run.threads);
     TrackedFrame tracked;
     {
         const Progress progress("estimating the pose in " + o.frame);
@@ -257,11 +162,7 @@ Outcome estimate_frame(const EstimateOptions& o, TrackerOptions options) {
             take();
         });
     }
-    if (!tracked.measured) {
-        say(fmt::format("{} gives no pose: {}: {}", o.frame,
-                        kAnswerKinds[static_cast<std::size_t>(tracked.answer.kind)], tracked.why));
-        return nlohmann::json{{"passed", false}, {"answer", to_json(tracked.answer)}};
-    }
+    if (!tracked.measured) return no_pose(o.frame, tracked.answer, tracked.why);
     nlohmann::json document = show({scene.bodies[*target].name, scene.cameras[*camera].name, "camera",
                                     T_world_camera, options.guess.value_or(tracked.truth), o.no_truth},
                                    *tracked.measured, tracked.covariance, tracked.bound, tracked.answer);
@@ -276,7 +177,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     auto world = world_of(o, t_ns, t_ns + kLater_ns);
     if (!world) return world.error();
     const Scene& scene = (*world)->scene();
-    const auto index = sensor_named(scene.lidars, o.sensor, "LiDAR", scene.file);
+    const auto index = sensor_named(scene.lidars, o.run.sensor, "LiDAR", scene.file);
     if (!index) return index.error();
     const Lidar& lidar = scene.lidars[*index];
     auto target = target_of(**world, lidar.mount, lidar.name, tracker.target);
@@ -287,7 +188,7 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     LidarSweep& sweep = captured->sweep;
     BodyPoses then(scene.bodies.size());
     (*world)->place(t_ns, lidar.mount, then);
-    remove_own_body(sweep, **world, lidar, then);
+    remove_own_body((*world)->tracer(), lidar, sweep);
     const auto T_lidar_target_at = [&](std::int64_t t) {
         BodyPoses at(scene.bodies.size());
         (*world)->place(t, lidar.mount, at);
@@ -304,8 +205,8 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
     settings.model = tracker.model;
     settings.noise = range_noise_of(lidar);
     settings.certain = certain_return_of(lidar, scene);
-    if (o.range_noise_m > 0) settings.noise.range_m = o.range_noise_m;
-    TracingThreads threads(o.threads);
+    if (tracker.range_noise_m > 0) settings.noise.range_m = tracker.range_noise_m;
+    TracingThreads threads(o.run.threads);
     std::optional<Result<CloudEstimate>> found;
     {
         const Progress progress("estimating the pose in " + o.sweep);
@@ -313,12 +214,14 @@ Outcome estimate_sweep(const EstimateOptions& o, const TrackerOptions& tracker) 
             const Tracer& tracer = (*world)->tracer();
             return tracker.search ? CloudSearch(tracer, *target, settings).find(sweep.points, motion, sweep.empty)
                                   : CloudIcp(tracer, *target, settings)
-                                        .align(sweep.points, motion, guess, search_m, sweep.empty);
+                                        .align(sweep.points, motion, guess, search_m, sweep.empty,
+                                               start_covariance(tracker, norm(truth.t)));
         };
         threads.arena.execute([&] { found.emplace(estimate()); });
     }
     if (!*found) return Error{found->error().what, o.sweep, 0, 0, ErrorKind::failed};
     const CloudEstimate& e = **found;
+    if (e.used < kFewestSweepPoints) return no_pose(o.sweep, e.answer, e.answer.why);
     nlohmann::json document =
         show({scene.bodies[*target].name, lidar.name, "lidar", T_world_lidar, truth, o.no_truth}, e.T_lidar_target,
              e.covariance, e.bound, e.answer);
@@ -343,14 +246,25 @@ Outcome estimate(EstimateOptions o) {
     std::error_code error;
     if (std::filesystem::exists(o.input + "/rehearsal.json", error)) o.input += "/emulator";
     const bool of_log = std::filesystem::is_directory(o.input, error);
+    if (of_log && !o.sets.empty())
+        return Error{
+            "--set goes with a scene: the frames and sweeps of a run are made again from the scene that it was "
+            "flown "
+            "with; fly another with `narpa run SCENE --set`",
+            o.input};
     for (const Option& option : of_log ? o.only_of_files : o.only_of_logs)
         if (option.given())
             return Error{fmt::format("{} goes with {}", option.name(),
                                      of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
                          o.input};
-    if (auto made = make_folder_of(o.csv); !made) return made.error();
-    if (auto made = make_folder_of_picture(o.picture); !made) return made.error();
-    if (of_log) return estimate_log(o, *tracker);
+    if (of_log) {
+        for (const Option& option : o.only_of_frames)
+            if (option.given()) o.run.of_frames.push_back(option.name());
+        for (const Option& option : o.only_of_sweeps)
+            if (option.given()) o.run.of_sweeps.push_back(option.name());
+        o.run.folder = o.input;
+        return estimate_run(o.run, *tracker);
+    }
     if (tracker->range_guess_m > 0 && !o.sweep.empty())
         return Error{"a range is guessed for frames, not for a sweep, which measures it"};
     if (o.frame.empty() && o.sweep.empty() && !find_file(FileKind::scene, o.input))
@@ -380,7 +294,7 @@ Command add_estimate(Parser app) {
         .required();
     SceneArgument::add_set_to(c, o->sets);
     add_strict_to(c);
-    c.option("--camera,--lidar", o->sensor, "Name of the camera or LiDAR (default: the first of the scene)")
+    c.option("--camera,--lidar", o->run.sensor, "Name of the camera or LiDAR (default: the first of the scene)")
         .type_name("NAME");
     c.option(
          "--frame", o->frame,
@@ -396,7 +310,7 @@ Command add_estimate(Parser app) {
     c.option("--time", o->time_s, "Simulation time of the frame or the sweep's first shot")
         .type_name("SECONDS")
         .range(-9e9, 9e9);
-    c.option("--range-noise", o->range_noise_m,
+    c.option("--range-noise", o->tracker.tracker.range_noise_m,
              "Standard deviation of the sweep's ranges (default: that of the scene, or 0.02)")
         .type_name("METRES")
         .range(1e-6, 1e3);
@@ -404,22 +318,22 @@ Command add_estimate(Parser app) {
            "The poses are not the truth but a guess: begin there (a sweep: within --start of it), and compare with "
            "nothing");
     o->pose.add_to(c);
-    c.option("--scene", o->scene, "Scene file (default: the run's)").type_name("SCENE");
+    c.option("--scene", o->run.scene, "Scene file (default: the run's)").type_name("SCENE");
     o->tracker.add_to(c, "");
-    c.option("--every", o->every, "Use every N-th frame").range(1, 1000000);
-    c.option("--threads", o->threads, "Threads (default: all cores)").range(0, 1024);
-    c.option("--csv", o->csv, "A row for each frame").type_name("FILE.csv");
-    c.option("-o,--output", o->picture, "Errors over time, with three standard deviations and bound")
+    c.option("--every", o->run.every, "Use every N-th frame or sweep").range(1, 1000000);
+    c.option("--threads", o->run.threads, "Threads (default: all cores)").range(0, 1024);
+    c.option("--csv", o->run.csv, "A row for each frame or sweep").type_name("FILE.csv");
+    c.option("-o,--output", o->run.picture, "Errors over time, with three standard deviations and bound")
         .type_name("FILE.png");
-    for (const char* name : {"--set", "--frame", "--sweep", "--time", "--unit", "--range-noise", "--no-truth",
-                             "--pose", "--trajectory"})
+    for (const char* name : {"--frame", "--sweep", "--time", "--unit", "--no-truth", "--pose", "--trajectory"})
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--method", "--frame-noise"}) o->only_of_frames.push_back(c.find(name));
     for (const char* name : {"--unit", "--range-noise"}) o->only_of_sweeps.push_back(c.find(name));
     for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
-    c.footer("Exit status 1 if no frame gave a pose, or that of a single frame or sweep is ambiguous or refused.");
+    c.footer("Exit status 1 if no frame or sweep gave a pose, or that of a single one is ambiguous or refused.");
     c.group("Results");
-    c.examples({"narpa estimate out/first-flight -o out/errors.png", "narpa estimate docking --frame out/frame.raw",
+    c.examples({"narpa estimate out/first-flight -o out/errors.png", "narpa estimate out/first-flight --lidar top",
+                "narpa estimate docking --frame out/frame.raw",
                 "narpa estimate asteroid.toml --frame image.png --no-truth --uncertainty scale=0.01,light_deg=1"});
     return [o] { return estimate(*o); };
 }

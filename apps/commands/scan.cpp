@@ -110,7 +110,7 @@ Outcome scan(const ScanOptions& o) {
     if (auto kept = keep_inputs(outputs_of(o, scene->lidars[*index]), *scene, {o.pose.trajectory}); !kept)
         return kept.error();
     if (auto placed = o.pose.place(*scene); !placed) return placed.error();
-    auto world = World::create(*std::move(scene));
+    auto world = World::create_for_lidars(*std::move(scene));
     if (!world) return world.error();
 
     const double duration_s =

@@ -24,8 +24,9 @@ namespace {
 
 struct EstimateBenchOptions {
     std::vector<std::string> only;
-    std::string plots;  ///< folder; empty: none
-    std::string scene, camera, target;
+    std::string plots;    ///< folder; empty: none
+    SceneArgument scene;  ///< of the part `approach`
+    std::string camera, target;
     std::vector<double> along, up;
     bool quick = false;
     int threads = 0, size = 320;
@@ -100,8 +101,8 @@ Outcome bench_pnp(const EstimateBenchOptions& o, Findings& findings) {
 }
 
 /// The world of the parts `approach` and `lidar`, with images of this size.
-Result<std::unique_ptr<World>> benchmark_world(const std::string& scene_file, int size) {
-    auto scene = scene_or_shipped(scene_file, "docking/docking.toml");
+Result<std::unique_ptr<World>> benchmark_world(const SceneArgument& of, int size) {
+    auto scene = scene_or_shipped(of, "docking/docking.toml");
     if (!scene) return scene.error();
     for (Camera& c : scene->cameras) resize_longer_side(c, size);
     return World::create(*std::move(scene));
@@ -150,7 +151,7 @@ Outcome bench_approach(const EstimateBenchOptions& o, Findings& findings) {
 }
 
 Outcome bench_stereo(const EstimateBenchOptions& o, Findings& findings) {
-    auto scene = scene_or_shipped("", "descent/descent.toml");
+    auto scene = scene_or_shipped({}, "descent/descent.toml");
     if (!scene) return scene.error();
     Progress progress("stereo");
     const int points = o.quick ? 20 : 100;
@@ -170,7 +171,7 @@ Outcome bench_stereo(const EstimateBenchOptions& o, Findings& findings) {
 }
 
 Outcome bench_icp(const EstimateBenchOptions& o, Findings& findings) {
-    auto world = benchmark_world("", o.size);
+    auto world = benchmark_world({}, o.size);
     if (!world) return world.error();
     const auto target = (*world)->body_named("station");
     if (!target) return Error{"no body \"station\" in the docking scene", (*world)->scene().file};
@@ -229,7 +230,7 @@ Outcome bench_consistency(const EstimateBenchOptions& o, Findings& findings) {
 }
 
 Outcome bench_cold(const EstimateBenchOptions& o, Findings& findings) {
-    auto docking = scene_or_shipped("", "docking/docking.toml");
+    auto docking = scene_or_shipped({}, "docking/docking.toml");
     if (!docking) return docking.error();
     ColdOptions options = o.cold;
     if (o.quick) options.trials = 3;
@@ -255,6 +256,8 @@ constexpr std::pair<const char*, Part> kParts[] = {
 
 Outcome bench_estimates(const EstimateBenchOptions& o) {
     stop_on_signals();
+    if (!o.scene.sets.empty() && !o.only.empty() && std::ranges::find(o.only, "approach") == o.only.end())
+        return Error{"--set changes the scene of the part approach, which --only leaves out"};
     if (!o.plots.empty()) {
         std::error_code error;
         std::filesystem::create_directories(o.plots, error);
@@ -304,8 +307,10 @@ Command add_bench_estimate(Parser bench_command) {
     const Option nominal = c.flag("!--nominal-only", o->pnp.hard_cases, "pnp: no hard cases");
     c.flag("!--hard-only", o->pnp.nominal, "pnp: only the hard cases").excludes(nominal);
     c.option("--seed", o->pnp.seed, "pnp: of all draws").shows_default();
-    c.option("--scene", o->scene, "approach: scene file (default: the docking scene that is installed with narpa)")
+    c.option("--scene", o->scene.file,
+             "approach: scene file (default: the docking scene that is installed with narpa)")
         .type_name("SCENE");
+    o->scene.add_settings_to(c);
     c.option("--camera", o->camera, "approach: name of the camera (default: the first)").type_name("NAME");
     c.option("--target", o->target, "approach: name of the body (default: the first that it can be)")
         .type_name("BODY");

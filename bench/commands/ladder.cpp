@@ -45,7 +45,7 @@ static_assert(std::min({kLadderFrames, kRatioFrames, kLoads}) >= 7);
 
 /// The scene with the camera and method that are measured.
 Result<std::unique_ptr<World>> world_of(const BenchmarkScene& s, int size, std::size_t& camera) {
-    auto scene = scene_or_shipped("", s.file, s.method);
+    auto scene = scene_or_shipped({}, s.file, s.method);
     if (!scene) return scene.error();
     const std::string folder = scene->file.substr(0, scene->file.rfind('/'));
     scene->render.max_depth = s.max_depth;
@@ -109,7 +109,7 @@ Result<SceneLadder> measure(const BenchmarkScene& s, const LadderOptions& o, Tra
 
 Result<CraftRatios> measure_craft(const LadderOptions& o, TracingThreads& threads) {
     const auto load = [&] {
-        auto scene = scene_or_shipped("", "craft/craft.toml");
+        auto scene = scene_or_shipped({}, "craft/craft.toml");
         if (scene && o.quick)
             for (Camera& c : scene->cameras) resize_longer_side(c, 128);
         return scene;

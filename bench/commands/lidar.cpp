@@ -19,7 +19,8 @@ constexpr double kDivergence_rad = 3e-3;  // where the scene states none: that o
 constexpr double kShippedTime_s = 50;     // of the shipped scene: the station is then 1.2 m away
 
 struct LidarBenchOptions {
-    std::string scene, lidar;
+    SceneArgument scene;
+    std::string lidar;
     PoseOptions pose;
     std::optional<double> time_s, divergence_rad;
     LidarCostSettings settings;
@@ -41,7 +42,7 @@ Status check_sub_rays(std::vector<int>& sub_rays) {
 Result<Scene> load(LidarBenchOptions& o) {
     auto scene = scene_or_shipped(o.scene, "docking/docking.toml");
     if (!scene) return scene.error();
-    if (o.scene.empty() && o.pose.trajectory.empty() && o.pose.poses.empty()) {
+    if (o.scene.file.empty() && o.pose.trajectory.empty() && o.pose.poses.empty()) {
         o.pose.trajectory = std::filesystem::path(scene->file).replace_filename("approach.csv");
         if (!o.time_s) o.time_s = kShippedTime_s;
     }
@@ -139,10 +140,11 @@ Command add_bench_lidar(Parser bench_command) {
     const Parser c = bench_command.subcommand(
         "lidar", "Time and range error of a LiDAR's turn at several numbers of sub-rays, beside Embree alone");
     c.option(
-        "SCENE", o->scene,
+        "SCENE", o->scene.file,
         fmt::format("Scene file (TOML; default: the docking scene that is installed with narpa, {:g} s into its "
                     "approach)",
                     kShippedTime_s));
+    o->scene.add_settings_to(c);
     c.option("--lidar", o->lidar, "Name of the LiDAR (default: the first)").type_name("NAME");
     c.option("--time", o->time_s, "Simulation time of the turn's start (default: 0)")
         .type_name("SECONDS")

@@ -19,7 +19,8 @@ namespace {
 constexpr int kCpusMax = 1024;
 
 struct LoopBenchOptions {
-    std::string scene, cpus, plot, trajectory;
+    SceneArgument scene;
+    std::string cpus, plot, trajectory;
     std::optional<double> duration_s;
     std::vector<int> load;
     int busy = 0;  ///< processors to keep busy, where `load` does not name them
@@ -129,7 +130,8 @@ Command add_bench_loop(Parser bench_command) {
     o->run.duration_s = 10;
     const Parser c = bench_command.subcommand(
         "loop", "The real-time loop, alone and under load from other processes: jitter, latency, deadlines");
-    c.option("SCENE", o->scene, "Scene file (TOML; default: the docking scene that is installed with narpa)");
+    c.option("SCENE", o->scene.file, "Scene file (TOML; default: the docking scene that is installed with narpa)");
+    o->scene.add_settings_to(c);
     c.option("--duration,--seconds", o->duration_s,
              "Seconds of each of the two runs (default: 10, or the flight of --trajectory)")
         .type_name("SECONDS")

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numeric>
 
+#include "apps/warnings.h"
 #include "bench/budget_ladder.h"
 #include "bench/commands/commands.h"
 #include "bench/commands/ladder.h"
@@ -18,7 +19,8 @@ namespace {
 constexpr int kDefaultSize = 64;  // px, the longer side
 
 struct RenderBenchOptions {
-    std::string scene, camera, size, plot;
+    SceneArgument scene;
+    std::string camera, size, plot;
     std::vector<int> spp{4, 8, 16, 32};
     int reference_spp = 4096, seeds = 16, threads = 0;
     LadderOptions ladder;
@@ -155,8 +157,10 @@ Command add_bench_render(Parser bench_command) {
     auto o = std::make_shared<RenderBenchOptions>();
     const Parser c = bench_command.subcommand(
         "render", "Error of an image against samples and time, beside a reference of many samples");
+    add_strict_to(c);
     const std::array of_one_scene{
-        c.option("SCENE", o->scene, "Scene file (TOML; default: the Cornell box that comes with narpa)"),
+        SceneArgument::add_set_to(c, o->scene.sets),
+        c.option("SCENE", o->scene.file, "Scene file (TOML; default: the Cornell box that comes with narpa)"),
         c.option("--camera", o->camera, "Name of the camera (default: the first)").type_name("NAME"),
         c.option("--spp", o->spp, "Samples per pixel to measure at").comma_separated().shows_default(),
         c.option("--reference-spp", o->reference_spp, "Samples per pixel of the reference, a multiple of 16")

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/scene_argument.h"
 #include "base/program_beside.h"
 #include "renderer/camera/scene_camera.h"
 
@@ -19,12 +18,14 @@ Result<std::string> shipped_scene(const std::string& name) {
     return Error{"is not beside the program, expected the name of a SCENE", name};
 }
 
-Result<Scene> scene_or_shipped(const std::string& file, const std::string& shipped,
+Result<Scene> scene_or_shipped(SceneArgument scene, const std::string& shipped,
                                std::optional<RenderSettings::Method> method) {
-    if (!file.empty()) return SceneArgument{file, {}}.load(method);
-    auto found = shipped_scene(shipped);
-    if (!found) return found.error();
-    return SceneArgument{*found, {}}.load(method);
+    if (scene.file.empty()) {
+        auto found = shipped_scene(shipped);
+        if (!found) return found.error();
+        scene.file = *std::move(found);
+    }
+    return scene.load(method);
 }
 
 void resize(Camera& c, int width, int height) {

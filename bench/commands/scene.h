@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/scene_argument.h"
 #include "base/result.h"
 #include "renderer/scene/scene.h"
 
@@ -12,8 +13,8 @@ namespace narpa::cli {
 /// Path of a shipped scene: the scenes lie beside the folder of the program, in a build tree and when installed.
 [[nodiscard]] Result<std::string> shipped_scene(const std::string& name);
 
-/// Reads `file`, or the shipped scene where `file` is empty.
-[[nodiscard]] Result<Scene> scene_or_shipped(const std::string& file, const std::string& shipped,
+/// Reads the scene, or the shipped one where no file is given; --set applies to both.
+[[nodiscard]] Result<Scene> scene_or_shipped(SceneArgument scene, const std::string& shipped,
                                              std::optional<RenderSettings::Method> method = {});
 
 /// Changes the resolution and keeps the view.

@@ -12,6 +12,7 @@
 #include "bench/statistics.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
+#include "estimator/uncertainty/observed_error.h"
 #include "renderer/detector/detector.h"
 #include "tracking/estimate_report.h"
 
@@ -58,7 +59,8 @@ ApproachFrame estimate(FrameEstimator& method, const ApproachView& view, const R
     if (!out.claimed) return out;
     const Vector6 error = error_between(e->T_camera_target, view.truth);
     out.rotation_rad = error.head<3>().norm(), out.position_m = error.tail<3>().norm();
-    out.nees = normalised_error_squared(error, e->covariance);
+    const ObservedError nees = observed_error(e->T_camera_target, e->covariance, e->answer, view.truth);
+    out.nees = nees.squared, out.observed = nees.freedom;
     out.found =
         out.rotation_rad < kFoundPart * off.head<3>().norm() && out.position_m < kFoundPart * off.tail<3>().norm();
     if (!with_bound || !out.found) return out;
@@ -80,7 +82,7 @@ ApproachBand band_of(const std::vector<ApproachFrame>& frames, double from_m, do
         if (!f.found) continue;
         ++b.found;
         turn.add(f.rotation_rad), shift.add(f.position_m);
-        nees.push_back(f.nees);
+        if (f.observed == 6) nees.push_back(f.nees);
         if (!(f.bound_rotation_rad > 0)) continue;
         turn_of_bound.add(f.rotation_rad / f.bound_rotation_rad);
         shift_of_bound.add(f.position_m / f.bound_position_m);

@@ -46,7 +46,8 @@ struct ApproachFrame {
     std::string why;                          ///< why the pose is not claimed, or not in all motions
     double rotation_rad = 0, position_m = 0;  ///< errors
     double bound_rotation_rad = 0, bound_position_m = 0;  ///< roots of the summed variances of the bound
-    double nees = 0;
+    double nees = 0;                                      ///< of the observed motions,
+    int observed = 6;                                     ///< and their number
     double ms = 0;
     int renders = 0;
 };
@@ -58,7 +59,7 @@ struct ApproachBand {
     int wrong = 0;  ///< claimed, and beyond their covariance: kSixSigmaNees
     double rotation_rms_rad = 0, position_rms_m = 0;
     double rotation_of_bound = 0, position_of_bound = 0;  ///< RMS of error over bound
-    double nees_median = 0;                               ///< 5.35 for a consistent estimator
+    double nees_median = 0;  ///< of poses with all motions observed; 5.35 for a consistent estimator
     double ms_median = 0, renders_mean = 0;
 };
 

@@ -15,6 +15,7 @@
 #include "bench/statistics.h"
 #include "estimator/search/pose_search.h"
 #include "estimator/search/template_matcher.h"
+#include "estimator/uncertainty/observed_error.h"
 #include "renderer/detector/detector.h"
 #include "tracking/estimate_report.h"
 
@@ -123,7 +124,7 @@ ColdTrial cold_trial(ColdTarget& target, const ColdOptions& o, ColdDraw& d) {
     out.answer = e->answer.kind, out.why = e->answer.why;
     out.templates = e->templates, out.renders = e->renders;
     const Vector6 error = error_between(e->T_camera_target, truth);
-    out.nees = normalised_error_squared(error, e->covariance);
+    out.nees = observed_error(e->T_camera_target, e->covariance, e->answer, truth).squared;
     out.rotation_rad = error.head<3>().norm(), out.position_of_range = error.tail<3>().norm() / range_m;
     return out;
 }

@@ -98,6 +98,15 @@ std::vector<RecordedFile> file_list(const json& files) {
 
 }  // namespace
 
+Result<Scene> read_run_scene(const RunRecord& record, const std::string& scene_file) {
+    auto scene = read_scene(scene_file.empty() ? record.scene_file : scene_file, record.overrides);
+    if (!scene) return scene;
+    if (auto good = use_method(*scene, record.method); !good) return good.error();
+    scene->render.max_depth = record.max_depth;
+    scene->render.seed = record.seed;
+    return scene;
+}
+
 std::vector<std::string> changed_files(const RunRecord& record) {
     std::vector<std::string> changed;
     for (const RecordedFile& file : record.files)

@@ -37,6 +37,8 @@ Status remove_run(const std::string& folder);
 Status write_run_record(const std::string& folder, const Scene& scene);
 /// Reads it back. Errors name file, line and what was expected.
 Result<RunRecord> read_run_record(const std::string& folder);
+/// The run's scene with the settings of the run; `scene_file`: another file in place of its own, empty: none.
+Result<Scene> read_run_scene(const RunRecord& record, const std::string& scene_file = "");
 /// Of the files that the run's scene was read from, those whose content is another now or that are gone.
 [[nodiscard]] std::vector<std::string> changed_files(const RunRecord& record);
 

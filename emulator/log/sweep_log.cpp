@@ -6,7 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <utility>
+
+#include "base/text/csv.h"
+#include "base/text/read_number.h"
 
 namespace narpa {
 namespace {
@@ -20,6 +24,37 @@ std::size_t format_row(std::span<char> out, fmt::format_string<Args...> format, 
 }
 
 }  // namespace
+
+Result<std::vector<LoggedSweep>> read_sweep_log(const std::string& path) {
+    const auto bad = [&](int line, std::ptrdiff_t column, std::string what) {
+        return Error{std::move(what), path, line, static_cast<int>(column)};
+    };
+    constexpr std::string_view header = kSweepHeader.substr(0, kSweepHeader.size() - 1);
+    std::ifstream in(path);
+    if (!in) return bad(0, 0, "cannot be read, expected the log of a LiDAR's sweeps");
+    TextLines lines(in);
+    std::string_view line;
+    if (!lines.next(line) || line != header)
+        return bad(1, 1, fmt::format("expected the header line \"{}\"", header));
+    std::vector<LoggedSweep> sweeps;
+    while (lines.next(line)) {
+        LoggedSweep& logged = sweeps.emplace_back();
+        logged.line = lines.number();
+        SweepLedger& s = logged.ledger;
+        const std::vector<std::string_view> cells = cells_of(line);
+        std::size_t i = 0;
+        const auto read = [&](auto&... values) {
+            return ((i < cells.size() && read_number(cells[i], values) && ++i > 0) && ...);
+        };
+        const bool good =
+            read(s.sweep, s.t_first_shot_ns, s.t_last_shot_ns, s.packets, s.late, s.skipped, s.shots, s.returns,
+                 s.t_complete_ns, s.t_hand_over_ns, s.hand_over_max_ns, s.packets_crc32, s.lost);
+        if (good && i == cells.size()) continue;
+        const std::ptrdiff_t column = i < cells.size() ? cells[i].data() - line.data() + 1 : 1;
+        return bad(logged.line, column, fmt::format("expected whole numbers: {}", header));
+    }
+    return sweeps;
+}
 
 std::size_t format_shot_row(std::span<char> out, const LidarUnit& unit, std::int64_t packet,
                             std::size_t i) noexcept {

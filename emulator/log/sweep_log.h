@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/result.h"
 #include "emulator/lidar/lidar_unit.h"
@@ -34,6 +35,13 @@ struct SweepLedger {
 inline constexpr std::string_view kSweepHeader =
     "sweep,t_first_shot_ns,t_last_shot_ns,packets,packets_late,packets_skipped,shots,returns,t_complete_ns,"
     "t_hand_over_ns,hand_over_max_ns,packets_crc32,packets_lost\n";
+struct LoggedSweep {
+    SweepLedger ledger;
+    int line = 0;  ///< of the log
+};
+/// Reads the LIDAR.sweeps.csv of one LiDAR. Errors name file, line and column.
+Result<std::vector<LoggedSweep>> read_sweep_log(const std::string& path);
+
 /// Header of LIDAR.shots.csv and of `narpa scan -o FILE.csv`: the truth of the beam's axis, then what the packets
 /// state of it, before rounding.
 inline constexpr std::string_view kShotHeader =

@@ -10,7 +10,6 @@
 #include "protocols/video/embedded_line.h"
 #include "renderer/camera/read_out.h"
 #include "renderer/detector/detector.h"
-#include "renderer/scene_file/scene_file.h"
 
 namespace narpa {
 namespace {
@@ -124,11 +123,8 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::string& folder, const st
                                              const std::string& scene_file) {
     const auto record = read_run_record(folder);
     if (!record) return record.error();
-    auto scene = read_scene(scene_file.empty() ? record->scene_file : scene_file, record->overrides);
+    auto scene = read_run_scene(*record, scene_file);
     if (!scene) return scene.error();
-    if (auto good = use_method(*scene, record->method); !good) return good.error();
-    scene->render.max_depth = record->max_depth;
-    scene->render.seed = record->seed;
     const auto index = sensor_named(scene->cameras, camera, "camera", scene->file);
     if (!index) return index.error();
     const std::string stem = folder + "/" + scene->cameras[*index].name;

@@ -9,12 +9,13 @@
 #include "base/constants.h"
 #include "estimator/least_squares/median.h"
 #include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/observed_error.h"
 #include "estimator/uncertainty/root_information.h"
+#include "estimator/uncertainty/share.h"
 
 namespace narpa {
 namespace {
 
-constexpr std::size_t kFewestBeams = 6;
 constexpr std::size_t kSearchPoints = 100;  ///< approximate number of the sweep's points that the search uses
 constexpr int kSearchIterations = 10;       ///< of the search, each with a smaller radius
 constexpr double kUnobservedBelow = 1e-3;   ///< normalised eigenvalue (observability.h)
@@ -37,20 +38,6 @@ constexpr double kElsewhere_sigmas = 2;
 /// another target.
 constexpr double kSearched = 2.5;
 
-/// True if `found` or more of n points would occur with a chance below 5 % if the true share were `least` (exact
-/// binomial test: Clopper and Pearson 1934). With few points nearly all must be found.
-bool share_is_more(std::size_t found, std::size_t n, double least) {
-    if (static_cast<double>(found) < least * static_cast<double>(n)) return false;
-    if (!(least > 0) || least >= 1) return true;
-    // The binomial distribution from n downwards.
-    double term = std::pow(least, static_cast<double>(n)), sum = term;
-    for (std::size_t k = n; k > found && sum < 0.05; --k) {
-        term *= static_cast<double>(k) / static_cast<double>(n - k + 1) * (1 - least) / least;
-        sum += term;
-    }
-    return sum < 0.05;
-}
-
 /// Upper bound of the motion of surfaces within `reach_m` of the target's origin.
 double surface_motion_m(const Vector6& pose_step, double reach_m) {
     return pose_step.tail<3>().norm() + pose_step.head<3>().norm() * reach_m;
@@ -68,29 +55,6 @@ bool rests_on_others(const CheckedInformation& all, const CheckedInformation& so
     return !(symmetric_eigen(parts).values[0] > 1 - kMax);
 }
 
-template <class Beam>
-Status check_beams(std::span<const Beam> beams, const char* what) {
-    for (std::size_t i = 0; i < beams.size(); ++i) {
-        const Beam& b = beams[i];
-        if (!is_finite(b.origin_m) || !is_finite(b.direction) || !std::isfinite(b.t_s))
-            return Error{fmt::format("{} {} of the sweep: origin, direction or time is not finite", what, i)};
-        if (std::abs(dot(b.direction, b.direction) - 1) > 1e-6)
-            return Error{fmt::format("{} {} of the sweep: expected a direction of length 1, not {:f}", what, i,
-                                     norm(b.direction))};
-    }
-    return Ok{};
-}
-
-Status check(std::span<const RangePoint> points, std::span<const EmptyBeam> empty) {
-    if (auto good = check_beams(empty, "beam without return"); !good) return good;
-    if (auto good = check_beams(points, "point"); !good) return good;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (!(points[i].range_m > 0 && std::isfinite(points[i].range_m)))
-            return Error{
-                fmt::format("point {} of the sweep: expected a range > 0, not {:f} m", i, points[i].range_m)};
-    return Ok{};
-}
-
 Status check_start(const Rigid3& T) {
     if (!is_finite(T.t) || !(std::abs(norm(T.q) - 1) < 1e-6))
         return Error{"the pose to start from: expected a finite position and a unit quaternion"};
@@ -98,6 +62,12 @@ Status check_start(const Rigid3& T) {
 }
 
 }  // namespace
+
+double search_radius_m(double position_sigma_m, double rotation_sigma_rad, double reach_m) {
+    constexpr double kSigmas = 4, kNear_m = 0.3;
+    const double radius_m = kSigmas * (position_sigma_m + rotation_sigma_rad * reach_m);
+    return radius_m > kNear_m ? radius_m : 0;
+}
 
 /// Sets covariance, bound and root information. `information`: that of the points the answer may rest on.
 void CloudIcp::set_covariance(const PlaneEquations& equations, const Matrix6& information,
@@ -108,28 +78,54 @@ void CloudIcp::set_covariance(const PlaneEquations& equations, const Matrix6& in
     if (const ModelUncertainty& u = settings_.model; u != ModelUncertainty{})
         by_model = joined(pose_shifts(u, out.T_lidar_target, motion_), equations.shifts(u, o));
     out.covariance_of_model = covariance_by(by_model);
-    out.bound = o.covariance(equations.information(), 1) + out.covariance_of_model;
-    out.covariance = o.covariance(information, factor) + out.covariance_of_model;
+    out.bound = o.covariance(equations.information(), 1, start_covariance_) + out.covariance_of_model;
+    out.covariance = o.covariance(information, factor, start_covariance_) + out.covariance_of_model;
     out.root_information = root_information_with(o.root_information(information, factor), by_model);
 }
 
-/// The answer may rest only on points that are checked by others and cannot lie on another surface.
-void CloudIcp::leave_out_unchecked_points(CloudEstimate& out) {
-    const Rigid3& T = out.T_lidar_target;
-    association_.set_scale(1 + out.scale);
-    association_.find_edges(T, settings_.noise);
-    const auto equations = linearise(T, 0, 1, out);
-    if (!equations) return;
-    CheckedInformation checked = checked_information(rows_, equations->spread(), kUnobservedBelow);
+/// Information of the points, of those last linearised at T, that the answer may rest on: checked by others, and
+/// not possibly on another surface. Marks the others in rows_.
+CheckedInformation CloudIcp::check_points(const PlaneEquations& equations, const Rigid3& T) {
+    CheckedInformation checked = checked_information(rows_, equations.spread(), kUnobservedBelow);
+    checked_rows_ = rows_;
     const double radius_m = kElsewhere_sigmas * settings_.noise.range_m;
     for (WeightedRow& row : rows_)
         row.checked = !association_.may_be_on_other_surface(T, settings_.noise, radius_m, row.measurement,
                                                             planes_[row.measurement]);
-    const CheckedInformation on_one = checked_information(rows_, equations->spread(), kUnobservedBelow);
-    if (rests_on_others(checked, on_one)) checked = on_one;
-    out.unchecked = checked.unchecked;
-    out.observability = checked.observability;
-    set_covariance(*equations, checked.information, out);
+    const CheckedInformation on_one = checked_information(rows_, equations.spread(), kUnobservedBelow);
+    if (rests_on_others(checked, on_one)) return on_one;
+    std::swap(rows_, checked_rows_);
+    return checked;
+}
+
+/// Gauss-Newton step by the points marked as checked.
+Vector6 CloudIcp::step_of_checked(const CheckedInformation& checked) const {
+    Vector6 gradient = Vector6::Zero();
+    for (const WeightedRow& row : rows_) {
+        const PointToPlane& p = planes_[row.measurement];
+        if (row.checked) gradient -= row.weight * p.distance_m / p.sigma_m * row.derivative;
+    }
+    return checked.observability.solve(checked.hessian, gradient);
+}
+
+/// Along the motions that then rest on no point, the pose returns to the start.
+void CloudIcp::leave_out_unchecked_points(const Rigid3& start, CloudEstimate& out) {
+    constexpr int kSteps = 5;
+    const int unobserved = out.observability.unobserved;
+    association_.set_scale(1 + out.scale);
+    association_.find_edges(out.T_lidar_target, settings_.noise);
+    for (int i = 0;; ++i) {
+        const auto equations = linearise(out.T_lidar_target, 0, 1, out);
+        if (!equations) return;
+        const CheckedInformation checked = check_points(*equations, out.T_lidar_target);
+        out.unchecked = checked.unchecked;
+        out.observability = checked.observability;
+        set_covariance(*equations, checked.information, out);
+        if (checked.observability.unobserved == unobserved || checked.observability.unobserved == 6 || i == kSteps)
+            return;
+        out.T_lidar_target = nearest_equivalent(displaced(out.T_lidar_target, step_of_checked(checked)),
+                                                checked.observability, start);
+    }
 }
 
 std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride,
@@ -143,7 +139,7 @@ std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search
     out.points = planes_.size();
     out.used = out.missed = out.edges = out.grazing = out.rejected = out.explained = 0;
     out.cost = 0;
-    if (magnitudes_.size() < kFewestBeams) return {};
+    if (magnitudes_.size() < kFewestSweepPoints) return {};
     PlaneEquations equations(std::max(1.0, kMadToSigma * upper_median(std::span(magnitudes_))));
     for (std::size_t k = 0; k < planes_.size(); ++k) {
         const PointToPlane& p = planes_[k];
@@ -169,7 +165,7 @@ std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search
             ++out.rejected;
     }
     out.used = equations.used();
-    if (out.used < kFewestBeams) return {};
+    if (out.used < kFewestSweepPoints) return {};
     const double sigma = settings_.model.scale;
     if (sigma > 0) out.cost += 0.5 * std::pow(out.scale / sigma, 2);
     equations.finish(out.scale, sigma);
@@ -232,11 +228,26 @@ double CloudIcp::edges_hold_m() const {
     return 0.05 * settings_.noise.footprint_rad * association_.nearest_m();
 }
 
+/// Moves the pose back to the start along the motions that the sweep does not observe: in a search, few points and
+/// their noise move it there. A pose that then fits worse than noise explains was observed, and stays.
+void CloudIcp::return_to_start(CloudEstimate& found, const Rigid3& start) {
+    if (found.used < kFewestSweepPoints || found.observability.unobserved == 0 ||
+        found.observability.unobserved == 6)
+        return;
+    const Rigid3 back = nearest_equivalent(found.T_lidar_target, found.observability, start);
+    CloudEstimate again = attempt(back, 0, kSearchPoints, kSearchIterations);
+    again.iterations += found.iterations;
+    if (!again.settled || again.cost > found.cost + 0.5 * kRival_chi2) return;
+    again.rivals = std::move(found.rivals);
+    found = std::move(again);
+}
+
 /// Beams that miss the model have no residual, so the fit may leave a face short of its edge. Repeats the search
 /// about the minimum, so that these beams find a surface.
 void CloudIcp::refit_missed_beams(CloudEstimate& found) {
     for (int i = 0; i < 3; ++i) {
-        if (found.used < kFewestBeams || found.explained + found.grazing + found.edges >= found.points) return;
+        if (found.used < kFewestSweepPoints || found.explained + found.grazing + found.edges >= found.points)
+            return;
         CloudEstimate again =
             attempt(found.T_lidar_target, kRefitRadius * found.radius_m, 4 * kSearchPoints, kSearchIterations);
         again.iterations += found.iterations;
@@ -261,7 +272,8 @@ bool CloudIcp::may_have_rivals(const CloudEstimate& e) {
 /// Keeps the best; another that is nearly as likely becomes a rival. True if a better one was found: the caller
 /// then repeats this about it, as still better ones may exist.
 bool CloudIcp::search_rivals(CloudEstimate& found, double search_m) {
-    if (found.used < kFewestBeams || found.observability.unobserved > 4 || !may_have_rivals(found)) return false;
+    if (found.used < kFewestSweepPoints || found.observability.unobserved > 4 || !may_have_rivals(found))
+        return false;
     const CloudEstimate first = found;
     for (const int motion : {first.observability.unobserved, first.observability.unobserved + 1})
         for (const double side : {-search_m, search_m}) {
@@ -269,7 +281,7 @@ bool CloudIcp::search_rivals(CloudEstimate& found, double search_m) {
             CloudEstimate rival = attempt(start, search_m, 2 * kSearchPoints, kSearchIterations);
             refit_missed_beams(rival);
             found.iterations += rival.iterations;
-            if (!rival.settled || rival.used < kFewestBeams) continue;
+            if (!rival.settled || rival.used < kFewestSweepPoints) continue;
             const bool better = rival.cost < found.cost - kBetter;
             const Matrix6& root = better ? rival.root_information : found.root_information;
             const Vector6 apart = error_between(found.T_lidar_target, rival.T_lidar_target);
@@ -294,7 +306,11 @@ Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start, double s
     if (!e.settled)
         fit.failed = fmt::format("still moving after {} iterations", e.iterations);
     else if (!e.on_model)
-        fit.failed = fmt::format("{} of {} points lie on the model", e.explained, e.points - e.edges);
+        fit.failed = fmt::format(
+            "{} of {} points lie on the model, expected {:.0f} % with a confidence of 95 %: {} or more "
+            "if all do",
+            e.explained, e.points - e.edges, 100 * settings_.min_inlier_share,
+            fewest_for_share(settings_.min_inlier_share));
     else if (const EmptyBeamCount& b = e.empty_beams; b.refutes())
         fit.failed =
             fmt::format("{} beams without return pass through the model, in {} stretches; {} beams meet it",
@@ -311,7 +327,7 @@ Answer CloudIcp::answer_of(const CloudEstimate& e, const Rigid3& start, double s
 
 Status CloudIcp::begin(std::span<const RangePoint> points, const ApparentMotion& motion,
                        std::span<const EmptyBeam> empty) {
-    if (auto good = check(points, empty); !good) return good;
+    if (auto good = check_sweep(points, empty); !good) return good;
     if (!is_finite(motion.velocity_m_s) || !is_finite(motion.rate_rad_s))
         return Error{"the motion during the sweep is not finite"};
     association_.take(points, motion);
@@ -321,6 +337,7 @@ Status CloudIcp::begin(std::span<const RangePoint> points, const ApparentMotion&
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());
     rows_.reserve(points.size());
+    checked_rows_.reserve(points.size());
     return Ok{};
 }
 
@@ -349,11 +366,13 @@ CloudIcp::Approach CloudIcp::approach(const Rigid3& start, double search_m) {
 }
 
 Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const ApparentMotion& motion,
-                                      const Rigid3& start, double search_m, std::span<const EmptyBeam> empty) {
+                                      const Rigid3& start, double search_m, std::span<const EmptyBeam> empty,
+                                      const std::optional<Matrix6>& start_covariance) {
     if (auto good = begin(points, motion, empty); !good) return good.error();
     if (auto good = check_start(start); !good) return good.error();
     if (!(search_m >= 0 && std::isfinite(search_m)))
         return Error{"search_m = " + std::to_string(search_m) + ": expected a distance >= 0 m"};
+    start_covariance_ = start_covariance;
     CloudEstimate out = attempt(start, search_m, kSearchPoints, kSearchIterations);
     if (search_m > 0 && !(out.settled && out.on_model)) {
         CloudEstimate again = attempt(start, search_m, 4 * kSearchPoints, 3 * kSearchIterations / 2);
@@ -364,12 +383,14 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
     if (search_m > 0)
         for (int k = 0; k < kRivalSearchesMax && search_rivals(out, search_m); ++k) {
         }
-    if (out.used < kFewestBeams)
-        return Error{.what = "only " + std::to_string(out.used) + " of " + std::to_string(points.size()) +
-                             " beams meet the target where it is taken to be, expected at least " +
-                             std::to_string(kFewestBeams),
-                     .kind = ErrorKind::failed};
-    leave_out_unchecked_points(out);
+    if (out.used < kFewestSweepPoints) {
+        out.answer.why =
+            fmt::format("only {} of {} returns meet the target where it is taken to be, expected at least {}",
+                        out.used, points.size(), kFewestSweepPoints);
+        return out;
+    }
+    return_to_start(out, start);
+    leave_out_unchecked_points(start, out);
     out.empty_beams = empty_beams_.count(out.T_lidar_target, out.covariance);
     out.answer = answer_of(out, start, search_m);
     return out;

@@ -5,7 +5,7 @@
 /// images", 1992; correspondences along the line of sight: G. Blais, M. Levine, 1995). Solved by robustly weighted
 /// Gauss-Newton: first on few points, with correspondences searched around each beam within decreasing radii; then
 /// on all points, along their beams. Unobservable motions keep their start value and are reported
-/// (observability.h).
+/// (observability.h): what the search has moved along them is undone.
 #pragma once
 
 #include <optional>
@@ -21,6 +21,9 @@
 #include "estimator/uncertainty/model_uncertainty.h"
 
 namespace narpa {
+
+/// With fewer points on the target there is no pose.
+inline constexpr std::size_t kFewestSweepPoints = 6;
 
 struct IcpSettings {
     RangeNoise noise{};
@@ -38,7 +41,7 @@ struct CloudEstimate {
     Rigid3 T_lidar_target{};
     /// Covariance of the pose's error (pose_estimate.h): of the robust estimate (P. Huber, Robust Statistics, 1981,
     /// section 7.6), scaled by the residuals' own scatter or the configured noise, whichever is larger, plus that
-    /// of the model's uncertainty.
+    /// of the model's uncertainty. Along unobserved motions that of the guess.
     Matrix6 covariance = Matrix6::Zero();
     Matrix6 covariance_of_model = Matrix6::Zero();  ///< part of the model's uncertainty, common to all sweeps
     /// Root of the inverse covariance, for filters: zero rows for unobserved motions (root_information.h).
@@ -68,6 +71,10 @@ struct CloudEstimate {
     double radius_m = 0;  ///< RMS distance of the points used from their centre
 };
 
+/// Search radius of CloudIcp::align for a guess with these standard deviations: four of them. 0, no search, below
+/// 0.3 m: a search costs much more than an alignment. `reach_m`: bounding radius of the target about its origin.
+[[nodiscard]] double search_radius_m(double position_sigma_m, double rotation_sigma_rad, double reach_m);
+
 class CloudIcp {
 public:
     /// `tracer` outlives it. `target`: index of the body whose pose is estimated.
@@ -77,13 +84,15 @@ public:
           empty_beams_(tracer, target, settings.noise, settings.certain) {}
 
     /// `search_m`: bound of the initial error of surface positions, about distance * angle + shift; 0: no search
-    /// around the beams. Refuses an answer that is fully observed but further from the start than 2.5 times
-    /// `search_m`, and one that the sweep's beams without return, `empty`, refute. Errors: non-finite input, a
-    /// range that is not positive, a direction that is not of unit length, or fewer than six beams that meet the
-    /// model. Allocates only when the sweep has more points than all before, or for an Error.
+    /// around the beams. Refuses an answer if fewer than six beams meet the model, or if it is fully observed but
+    /// further from the start than 2.5 times `search_m`, or refuted by the sweep's beams without return, `empty`.
+    /// `start_covariance`: of the start's error, kept along motions that the sweep does not observe. Errors:
+    /// non-finite input, a range that is not positive, or a direction that is not of unit length. Allocates only
+    /// when the sweep has more points than all before, or for an Error.
     [[nodiscard]] Result<CloudEstimate> align(std::span<const RangePoint> points, const ApparentMotion& motion,
                                               const Rigid3& start, double search_m = 0,
-                                              std::span<const EmptyBeam> empty = {});
+                                              std::span<const EmptyBeam> empty = {},
+                                              const std::optional<Matrix6>& start_covariance = {});
 
     /// For searches: the pose to which few points lead from an attitude, with search radii that start at
     /// `search_m`, and its cost (CloudEstimate::cost). The target is first shifted so that its surface is centred
@@ -101,7 +110,10 @@ public:
 private:
     [[nodiscard]] Answer answer_of(const CloudEstimate& found, const Rigid3& start, double search_m) const;
     void set_covariance(const PlaneEquations& equations, const Matrix6& information, CloudEstimate& out) const;
-    void leave_out_unchecked_points(CloudEstimate& out);
+    void leave_out_unchecked_points(const Rigid3& start, CloudEstimate& out);
+    [[nodiscard]] CheckedInformation check_points(const PlaneEquations& equations, const Rigid3& T);
+    [[nodiscard]] Vector6 step_of_checked(const CheckedInformation& checked) const;
+    void return_to_start(CloudEstimate& found, const Rigid3& start);
     /// Normal equations at this pose; empty if too few points meet the model.
     [[nodiscard]] std::optional<PlaneEquations> linearise(const Rigid3& T, double search_m, std::size_t stride,
                                                           CloudEstimate& out);
@@ -114,12 +126,14 @@ private:
                                 CloudEstimate& out);
 
     IcpSettings settings_;
+    std::optional<Matrix6> start_covariance_;
     BeamAssociation association_;
     EmptyBeams empty_beams_;
     ApparentMotion motion_{};  ///< of the sweep
     std::span<const RangePoint> points_;
     std::vector<PointToPlane> planes_;
     std::vector<WeightedRow> rows_;  ///< of the points used
+    std::vector<WeightedRow> checked_rows_;
     std::vector<double> magnitudes_;
 };
 

@@ -1,10 +1,28 @@
 #include "estimator/cloud/range_points.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "renderer/scene/scene.h"
 
 namespace narpa {
+namespace {
+
+template <class Beam>
+Status check_beams(std::span<const Beam> beams, const char* what) {
+    for (std::size_t i = 0; i < beams.size(); ++i) {
+        const Beam& b = beams[i];
+        if (!is_finite(b.origin_m) || !is_finite(b.direction) || !std::isfinite(b.t_s))
+            return Error{fmt::format("{} {} of the sweep: origin, direction or time is not finite", what, i)};
+        if (std::abs(dot(b.direction, b.direction) - 1) > 1e-6)
+            return Error{fmt::format("{} {} of the sweep: expected a direction of length 1, not {:f}", what, i,
+                                     norm(b.direction))};
+    }
+    return Ok{};
+}
+
+}  // namespace
 
 /// Distance of the centroid of a beam's few sample rays from its axis, per axis, as a part of the beam's angle. For
 /// eight rays; 32 have 0.006.
@@ -41,6 +59,16 @@ void SweepReader::append(std::span<const std::uint8_t> packet, std::int64_t pack
         out.points.push_back({p.origin_m, p.direction, p.range_m, after_s(p.t_offset_ns)});
     for (const LidarAxis& a : std::span(empty_).first(unit_.empty_shots(packet, empty_)))
         out.empty.push_back({a.origin_m, a.direction, after_s(a.t_offset_ns)});
+}
+
+Status check_sweep(std::span<const RangePoint> points, std::span<const EmptyBeam> empty) {
+    if (auto good = check_beams(empty, "beam without return"); !good) return good;
+    if (auto good = check_beams(points, "point"); !good) return good;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (!(points[i].range_m > 0 && std::isfinite(points[i].range_m)))
+            return Error{
+                fmt::format("point {} of the sweep: expected a range > 0, not {:f} m", i, points[i].range_m)};
+    return Ok{};
 }
 
 }  // namespace narpa

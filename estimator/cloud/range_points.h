@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/pose.h"
+#include "base/result.h"
 #include "protocols/lidar/lidar_model.h"
 
 namespace narpa {
@@ -35,6 +36,9 @@ struct LidarSweep {
 
     void clear() { points.clear(), empty.clear(); }
 };
+
+/// An Error at a beam that is not finite, whose direction is not of unit length, or whose range is not positive.
+[[nodiscard]] Status check_sweep(std::span<const RangePoint> points, std::span<const EmptyBeam> empty);
 
 /// Standard deviations of a return. With the angle of incidence i, the error along the surface's normal is
 /// sqrt((range cos i)^2 + (distance * pointing * sin i)^2): the effect of pointing and footprint width on the range

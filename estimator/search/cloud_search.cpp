@@ -60,12 +60,16 @@ Result<CloudEstimate> CloudSearch::find(std::span<const RangePoint> points, cons
          best_apart(std::move(approaches), static_cast<std::size_t>(options.finished), radius_m))
         if (auto fit = icp_.align(points, motion, a.T_lidar_target, kFitRadius * radius_m, empty))
             fits.push_back(*std::move(fit));
-        else if (fit.error().kind != ErrorKind::failed)
+        else
             return fit.error();
-    if (fits.empty())
-        return Error{.what = fmt::format("none of {} attitudes leads to a pose of {} points", options.attitudes,
-                                         points.size()),
-                     .kind = ErrorKind::failed};
+    std::erase_if(fits, [](const CloudEstimate& e) { return e.used < kFewestSweepPoints; });
+    if (fits.empty()) {
+        CloudEstimate none;
+        none.points = points.size();
+        none.answer.why =
+            fmt::format("none of {} attitudes leads to a pose of {} points", options.attitudes, points.size());
+        return none;
+    }
     std::ranges::stable_sort(fits, [](const CloudEstimate& a, const CloudEstimate& b) {
         return is_possible(a) != is_possible(b) ? is_possible(a) : a.cost < b.cost;
     });

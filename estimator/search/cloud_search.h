@@ -23,8 +23,8 @@ public:
     CloudSearch(const Tracer& tracer, std::size_t target, const IcpSettings& settings = {})
         : tracer_(tracer), target_(target), icp_(tracer, target, settings) {}
 
-    /// Like CloudIcp::align, without a guess. Errors: an unusable sweep or options, or fewer than six points on the
-    /// target at every pose tried.
+    /// Like CloudIcp::align, without a guess. Refused if no pose has six points on the target. Errors: an unusable
+    /// sweep or options.
     [[nodiscard]] Result<CloudEstimate> find(std::span<const RangePoint> points, const ApparentMotion& motion,
                                              std::span<const EmptyBeam> empty = {},
                                              const CloudSearchOptions& options = {});

@@ -35,12 +35,16 @@ Matrix6 Observability::along_motions(const Matrix6& information) const {
     return within;
 }
 
-Matrix6 Observability::covariance(const Matrix6& information, double factor) const {
-    Matrix6 within = ldlt_solve(along_motions(information), Matrix6(Matrix6::Identity()));
-    within.topLeftCorner(unobserved, unobserved).setZero();
-    Matrix6 c = factor * (motions * within * motions.transpose());
-    for (int i = 0; i < unobserved; ++i)
-        c += kUnobservedSigma * kUnobservedSigma * motions.col(i) * motions.col(i).transpose();
+Matrix6 Observability::covariance(const Matrix6& information, double factor,
+                                  const std::optional<Matrix6>& of_guess) const {
+    Matrix6 within = factor * ldlt_solve(along_motions(information), Matrix6(Matrix6::Identity()));
+    Matrix6 unknown = kUnobservedSigma * kUnobservedSigma * Matrix6::Identity();
+    if (of_guess && unobserved > 0) {
+        const Matrix6 along = inverse(motions);
+        unknown = along * *of_guess * along.transpose();
+    }
+    within.topLeftCorner(unobserved, unobserved) = unknown.topLeftCorner(unobserved, unobserved);
+    const Matrix6 c = motions * within * motions.transpose();
     return 0.5 * (c + c.transpose());
 }
 

@@ -7,6 +7,8 @@
 /// state estimation problems", ICRA 2016: the solution is not changed along these.
 #pragma once
 
+#include <optional>
+
 #include "estimator/pose/pose_estimate.h"
 
 namespace narpa {
@@ -33,15 +35,16 @@ struct Observability {
     [[nodiscard]] Vector6 solve(const Matrix6& hessian, const Vector6& gradient) const;
     /// The information matrix in coordinates along the motions; unit matrix for the unobserved ones.
     [[nodiscard]] Matrix6 along_motions(const Matrix6& information) const;
-    /// `factor` times the inverse of this information in the observable subspace; along unobservable motions the
-    /// standard deviation is kUnobservedSigma.
-    [[nodiscard]] Matrix6 covariance(const Matrix6& information, double factor) const;
+    /// `factor` times the inverse of this information in the observable subspace. Along unobservable motions it is
+    /// that of the guess; without one the standard deviation is kUnobservedSigma.
+    [[nodiscard]] Matrix6 covariance(const Matrix6& information, double factor,
+                                     const std::optional<Matrix6>& of_guess = {}) const;
     /// Root of the inverse of that covariance without the unobserved motions (root_information.h): a row of zeros
     /// for each of these.
     [[nodiscard]] Matrix6 root_information(const Matrix6& information, double factor) const;
 };
 
-/// Standard deviation along an unobserved motion, m: so large that a filter ignores the estimate along it.
+/// Standard deviation along an unobserved motion if nothing is known of it, m.
 inline constexpr double kUnobservedSigma = 1e4;
 
 /// `hessian`: the sum of weight * J J', J the derivative of a point's distance from its plane with the motion.

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <opencv2/imgproc.hpp>
 
 namespace narpa {
 namespace {
@@ -70,55 +69,6 @@ double light_ratio(const Signals& s, const std::vector<std::uint8_t>& usable, do
         gain = frame / render, limit = most / gain;
     }
     return gain;
-}
-
-/// Bounding rectangle of the lit pixels, with a border of two pixels within the image.
-cv::Rect extent(const std::vector<std::uint8_t>& lit, int width, int height) {
-    int left = width, top = height, right = -1, bottom = -1;
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            if (!lit[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)])
-                continue;
-            left = std::min(left, x), right = std::max(right, x), top = std::min(top, y), bottom = y;
-        }
-    left = std::max(0, left - 2), top = std::max(0, top - 2);
-    return {left, top, std::min(width, right + 3) - left, std::min(height, bottom + 3) - top};
-}
-
-/// Position of the peak of a parabola through three neighbouring values, relative to the middle one.
-double peak(double before, double at, double after) {
-    const double bend = before - 2 * at + after;
-    return bend < 0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0;
-}
-
-/// `most`: signal of the render at which the frame clips.
-std::optional<FrameComparison::Shift> find_shift(const Signals& s, double most, int width, int height) {
-    const auto image = [&](const std::vector<double>& signal, double limit) {
-        cv::Mat m(height, width, CV_32F);
-        std::ranges::transform(signal, m.begin<float>(),
-                               [limit](double v) { return static_cast<float>(std::min(v, limit)); });
-        return m;
-    };
-    constexpr int kMax = kMaxComparedShift_px;
-    const cv::Rect box = extent(s.lit_render, width, height);
-    const cv::Mat render = image(s.render, most)(box);
-    double low = 0, high = 0;
-    cv::minMaxLoc(render, &low, &high);
-    if (!(high - low > 1e-6 * high)) return {};
-    cv::Mat wide, match;
-    cv::copyMakeBorder(image(s.frame, INFINITY), wide, kMax, kMax, kMax, kMax, cv::BORDER_CONSTANT, 0);
-    cv::matchTemplate(wide({box.x, box.y, box.width + 2 * kMax, box.height + 2 * kMax}), render, match,
-                      cv::TM_CCOEFF_NORMED);
-    FrameComparison::Shift out;
-    cv::Point best;
-    cv::minMaxLoc(match, nullptr, &out.correlation, nullptr, &best);
-    out.x_px = best.x - kMax, out.y_px = best.y - kMax;
-    out.is_at_limit = std::max(std::abs(best.x - kMax), std::abs(best.y - kMax)) == kMax;
-    if (out.is_at_limit) return out;
-    const auto at = [&](int dx, int dy) { return static_cast<double>(match.at<float>(best.y + dy, best.x + dx)); };
-    out.x_px += peak(at(-1, 0), at(0, 0), at(1, 0));
-    out.y_px += peak(at(0, -1), at(0, 0), at(0, 1));
-    return out;
 }
 
 /// Variance of frame - gain * render at pixel p: of the sensor, and of the samples of both.
@@ -207,7 +157,9 @@ Result<FrameComparison> compare_frame(const MeasuredImage& frame, const SensorMo
     if (out.lit_render == 0 || !(out.gain > 0) || !std::isfinite(out.gain))
         return Error{
             "it is dark where the render is lit, or lit where the render is dark: expected the target there"};
-    out.shift = find_shift(s, brightest / out.gain, frame.width, frame.height);
+    std::vector<double> shown_by_frame = s.render;  // clipped as the frame is
+    for (double& signal : shown_by_frame) signal = std::min(signal, brightest / out.gain);
+    out.shift = find_shift({s.frame, shown_by_frame, s.lit_render, frame.width, frame.height});
     return out;
 }
 

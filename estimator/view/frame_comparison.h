@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "estimator/view/image_shift.h"
 #include "estimator/view/measured_image.h"
 
 namespace narpa {
@@ -20,7 +21,6 @@ struct ExpectedFrame {
     double frame_variance_ratio = 0;
 };
 
-inline constexpr int kMaxComparedShift_px = 32;
 /// With fewer lit pixels nothing is compared.
 inline constexpr std::size_t kFewestLit = 12;
 
@@ -45,14 +45,7 @@ struct FrameComparison {
     /// Root mean square of the residuals over the noise of sensor and render; nothing of a camera without a
     /// detector.
     std::optional<double> residual_noise;
-    /// Shift from the lit area in the render to that in the frame, x right and y down, by the largest normalised
-    /// cross-correlation (`correlation`: at the nearest whole pixel). At most kMaxComparedShift_px; if at that
-    /// limit, it may be larger.
-    struct Shift {
-        double x_px = 0, y_px = 0, correlation = 0;
-        bool is_at_limit = false;
-    };
-    std::optional<Shift> shift;        ///< nothing where the render is uniform
+    std::optional<ImageShift> shift;   ///< nothing where the render is uniform
     std::vector<std::uint8_t> usable;  ///< pixels of no other body that are not clipped
 
     /// Pixels lit in both over pixels lit in either.

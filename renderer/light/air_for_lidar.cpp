@@ -18,7 +18,28 @@ AirResolution lidar_resolution_of(const Atmosphere& a) {
     return r;
 }
 
+class LidarsAlone final : public Medium {
+public:
+    LidarsAlone(const Scene& scene, int threads) : lidar_(std::make_shared<const AirForLidar>(scene, threads)) {}
+    [[nodiscard]] MediumSegment along(const BodyPoses&, const Ray&, double, double) const noexcept override {
+        return {};
+    }
+    [[nodiscard]] bool uses_random_numbers() const noexcept override { return false; }
+    [[nodiscard]] Rgb transmittance(const BodyPoses&, const Ray&, double) const noexcept override {
+        return {1, 1, 1};
+    }
+    [[nodiscard]] std::shared_ptr<const LidarMedium> for_lidar() const override { return lidar_; }
+    [[nodiscard]] int body() const noexcept override { return lidar_->body(); }
+
+private:
+    std::shared_ptr<const LidarMedium> lidar_;
+};
+
 }  // namespace
+
+std::unique_ptr<const Medium> air_for_lidars_alone(const Scene& scene, int threads) {
+    return std::make_unique<LidarsAlone>(scene, threads);
+}
 
 AirForLidar::AirForLidar(const Scene& scene, int threads)
     : planet_(scene), sun_(scene.sun), air_(scene.atmosphere->air, kLidar_m, scene.atmosphere->steps) {

@@ -1,6 +1,7 @@
 /// renderer/light/air_for_lidar.h - a planet's air at the wavelength of LiDARs.
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "renderer/atmosphere/lidar_air.h"
@@ -29,5 +30,9 @@ private:
     LidarAir air_;
     std::optional<ScatteredLight> sunlight_;
 };
+
+/// The air of a scene in which only LiDARs measure. For light it is a vacuum: the tables of scattered light,
+/// seconds of work, are not made. `scene` has an atmosphere.
+[[nodiscard]] std::unique_ptr<const Medium> air_for_lidars_alone(const Scene& scene, int threads = 0);
 
 }  // namespace narpa

@@ -364,6 +364,7 @@ TEST_F(EstimateTest, ErrorsNameTheBadInput) {
     refuses(scene + " --sweep x --method dense", "--method goes with a frame, and this is a sweep");
     refuses(scene + " --frame x --range-noise 1", "--range-noise goes with a sweep, and this is a frame");
     refuses((folder_ / "") + " --no-truth", "--no-truth goes with a scene file");
+    refuses((folder_ / "") + " --set render.seed=3", "made again from the scene that it was flown with");
     refuses(scene + " --frame x --target moon", "expected one of: station, chaser");
     refuses(scene + " --frame x --start 5", "expected DEG,PERCENT");
     refuses(scene + " --frame x --range-guess 20", "start by search");
@@ -373,11 +374,17 @@ TEST_F(EstimateTest, ErrorsNameTheBadInput) {
 }
 
 TEST(EstimateSummary, TheBandOfOneNeesHas95Percent) {
-    const auto share_below = [](double x) {
-        return 1 - std::exp(-x / 2) * (1 + x / 2 + x * x / 8);
-    };  // chi-square, 6
-    EXPECT_NEAR(share_below(kNeesLow), 0.025, 1e-4);
-    EXPECT_NEAR(share_below(kNeesHigh), 0.975, 1e-4);
+    // Distributions of chi-square with 1 to 6 degrees of freedom.
+    const auto share_below = [](double x, int freedom) {
+        double share = freedom % 2 == 0 ? 1 - std::exp(-x / 2) : std::erf(std::sqrt(x / 2));
+        for (int f = freedom % 2 == 0 ? 2 : 1; f < freedom; f += 2)
+            share -= std::pow(x / 2, 0.5 * f) * std::exp(-x / 2) / std::tgamma(0.5 * f + 1);
+        return share;
+    };
+    for (int freedom = 1; freedom <= 6; ++freedom) {
+        EXPECT_NEAR(share_below(nees_band(freedom).low, freedom), 0.025, 1e-4) << freedom;
+        EXPECT_NEAR(share_below(nees_band(freedom).high, freedom), 0.975, 1e-4) << freedom;
+    }
 }
 
 TEST(EstimateSummary, SaysWhereTheNeesLies) {

@@ -126,6 +126,8 @@ def check_words():
     expect_refusal(2, 'no command "rendr"; did you mean "render"', "bench", "rendr")
     expect_refusal(2, 'narpa render: there is no option "--sppp"; did you mean "--spp"', "render", support.SCENE, "--sppp", "3")
     expect_refusal(2, 'narpa render: there is no option "--samples"; did you mean "--spp"', "render", support.SCENE, "--samples", "3")
+    expect_refusal(2, "--set changes the scene of the part approach, which --only leaves out", "bench", "estimate", "--only", "pnp", "--set", "render.seed=3")
+    expect_refusal(2, 'unknown key "exposre_s" in', "bench", "loop", support.SCENE, "--set", f"camera.{support.CAMERA}.exposre_s=1")
     expect_refusal(2, "Usage: narpa COMMAND")
     version = narpa("--version").stdout.decode()
     expect(re.search(r"^narpa \d+\.\d+\.\d+(, commit [0-9a-f]{7,}.*)?\nvector instructions: .+\n", version), f"--version: {version!r}")

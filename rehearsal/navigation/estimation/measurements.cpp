@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/time.h"
+#include "estimator/cloud/own_body.h"
 #include "estimator/view/measured_image.h"
 #include "renderer/camera/scene_camera.h"
 
@@ -14,8 +15,6 @@ namespace {
 
 /// Radius of the search around the prediction, in standard deviations.
 constexpr double kSearchSigmas = 4;
-/// No search if the prediction is this good, as a search costs much more than an alignment.
-constexpr double kNear_m = 0.3;
 /// Initial error, in pixels of a pyramid level, from which that level converges.
 constexpr double kDenseReach_px = 1;
 
@@ -83,38 +82,6 @@ MeasurementResult CameraPoseEstimator::measure(std::span<const std::uint8_t> byt
     return out;
 }
 
-/// Removes the beams that hit the chaser itself.
-void LidarPoseEstimator::remove_own_body(LidarSweep& sweep) const {
-    BodyPoses at(model_->scene().bodies.size());
-    const auto own = static_cast<std::uint32_t>(model_->chaser());
-    constexpr int kRim = 6;
-    const double tangent = std::tan(0.55 * lidar_.receiver.beam_divergence_rad);  // a tenth more than the beam
-    const auto remove = [&](auto& beams) {
-        RayBatch rays;
-        HitBatch hits;
-        std::size_t kept = 0;
-        for (std::size_t i = 0; i < beams.size(); i += kLanes) {
-            rays.n = std::min<std::size_t>(kLanes, beams.size() - i);
-            std::uint32_t met = 0;
-            for (int rim = 0; rim <= (tangent > 0 ? kRim : 0); ++rim) {  // the axis, then the rim of the beam
-                for (std::size_t k = 0; k < rays.n; ++k) {
-                    const Vec3 d = beams[i + k].direction, x = normalized(cross(d, Vec3{0, 0, 1})), y = cross(d, x);
-                    const double turn = 2 * kDegree * 180 * rim / kRim, r = rim == 0 ? 0 : tangent;
-                    const Vec3 ray = normalized(d + r * (std::cos(turn) * x + std::sin(turn) * y));
-                    rays.put(k, {lidar_.T_mount_lidar * beams[i + k].origin_m, lidar_.T_mount_lidar.q * ray});
-                }
-                model_->tracer().intersect(at, rays, {&own, 1}, hits);
-                met |= hits.met;
-            }
-            for (std::size_t k = 0; k < rays.n; ++k)
-                if (!is_set(met, k)) beams[kept++] = beams[i + k];
-        }
-        beams.resize(kept);
-    };
-    remove(sweep.points);
-    remove(sweep.empty);
-}
-
 MeasurementResult LidarPoseEstimator::measure(LidarSweep sweep, std::int64_t t_ns, const Prediction& predicted) {
     const std::int64_t start_ns = monotonic_ns();
     MeasurementResult out;
@@ -129,8 +96,10 @@ MeasurementResult LidarPoseEstimator::measure(LidarSweep sweep, std::int64_t t_n
         const double along = dot(to_target, b.direction);
         return along < 0 || dot(to_target, to_target) - along * along > std::pow(reach_m + off_m, 2);
     });
-    remove_own_body(sweep);
-    const auto e = icp_.align(sweep.points, in_lidar, guess, off_m > kNear_m ? off_m : 0, sweep.empty);
+    remove_own_body(model_->tracer(), lidar_, sweep);
+    const auto e =
+        icp_.align(sweep.points, in_lidar, guess,
+                   search_radius_m(predicted.position_sigma_m, predicted.rotation_sigma_rad, reach_m), sweep.empty);
     out.ms = seconds_since(start_ns) * 1e3;
     if (!e) {
         out.why = e.error().what;

@@ -75,8 +75,6 @@ public:
     [[nodiscard]] MeasurementResult measure(LidarSweep sweep, std::int64_t t_ns, const Prediction& predicted);
 
 private:
-    void remove_own_body(LidarSweep& sweep) const;
-
     SceneModel* model_;
     Lidar lidar_;
     CloudIcp icp_;

@@ -10,6 +10,7 @@
 #include "base/constants.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/filter/pose_filter.h"
+#include "estimator/uncertainty/observed_error.h"
 #include "tests/support/shapes.h"
 
 namespace narpa {
@@ -234,6 +235,57 @@ TEST(IcpShapes, PosesDoNotDriftAlongUnobservedMotions) {
         EXPECT_LT(along_unobserved(late, error_between(start, late.T_lidar_target)),
                   5 * start_error().squaredNorm());
     }
+}
+
+/// A search moves the pose along all motions, with few points; those that the sweep does not observe are undone,
+/// and keep the covariance of the start. Starts 8 degrees and 0.2 m off, in any direction.
+TEST(IcpShapes, SearchesLeaveUnobservedMotionsAtTheStart) {
+    std::mt19937_64 random(8);
+    const Draw middle = [](std::mt19937_64& r) {  // along the axis no point reaches an end
+        SurfacePoint p = on_cylinder(0)(r);
+        p.position.z *= 0.7;
+        return p;
+    };
+    const std::vector<SweptShape> shapes{
+        kShapes[0],
+        {"middle of an open cylinder", middle, 2, kShapes[1].add},
+        kShapes[2],
+        {"barrel of 96 sides", on_cylinder(0.2), 1, [](Scene& s) { test::add_mesh(s, cylinder(96, true)); }}};
+    constexpr double kTurn_rad = 8 * kDegree, kShift_m = 0.2;
+    Vector6 sigma;
+    sigma << Eigen::Vector3d::Constant(kTurn_rad), Eigen::Vector3d::Constant(kShift_m);
+    const Matrix6 known = Matrix6(sigma.cwiseAbs2().asDiagonal()) / 3;
+    double nees = 0, freedom = 0;
+    for (const SweptShape& shape : shapes) {
+        Scene scene;
+        scene.materials.push_back(test::lambert(0.5f));
+        shape.add(scene);
+        auto tracer = Tracer::create(scene, 1);
+        ASSERT_TRUE(tracer);
+        CloudIcp icp(*tracer, 0, {.noise = {0.02, 0}});
+        for (std::uint64_t trial = 0; trial < 6; ++trial) {
+            SCOPED_TRACE(std::string(shape.name) + " " + std::to_string(trial));
+            const auto points = returns(shape.draw, 800, 0.02, 20 + trial);
+            const Rigid3 start = displaced(kTruth, random_error(kTurn_rad, kShift_m, random));
+            const auto e = icp.align(points, {}, start, kShift_m + 1.8 * kTurn_rad, {}, known);
+            ASSERT_TRUE(e) << e.error().text();
+            ASSERT_EQ(e->answer.kind, AnswerKind::unobservable) << e->answer.why;
+            ASSERT_EQ(e->observability.unobserved, shape.unobserved);
+            const Rigid3 back = nearest_equivalent(e->T_lidar_target, e->observability, start);
+            const Vector6 moved = error_between(e->T_lidar_target, back);
+            EXPECT_LT(moved.head<3>().norm(), 0.1 * kDegree);
+            EXPECT_LT(moved.tail<3>().norm(), 2e-3);
+            for (int i = 0; i < shape.unobserved; ++i) {
+                const Vector6 along = e->observability.motions.inverse().row(i);
+                EXPECT_NEAR(along.dot(e->covariance * along), along.dot(known * along), 1e-6);
+            }
+            const ObservedError error = observed_error(e->T_lidar_target, e->covariance, e->answer, kTruth);
+            EXPECT_EQ(error.freedom, 6 - shape.unobserved);
+            EXPECT_LT(error.squared, 25);
+            nees += error.squared, freedom += error.freedom;
+        }
+    }
+    EXPECT_NEAR(nees / freedom, 1, 0.35) << "chi-square with " << freedom << " degrees of freedom";
 }
 
 }  // namespace

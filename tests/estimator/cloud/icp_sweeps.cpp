@@ -383,6 +383,25 @@ TEST(IcpSweeps, TheDerivativeIsThatOfTheDistance) {
         << "but for the few beams that a step takes across an edge";
 }
 
+TEST(IcpSweeps, TooFewPointsAreRefused) {
+    std::mt19937_64 random(16);
+    const Rigid3 T = truth(random);
+    const auto points = bench().sweep(T, {}, random);
+    CloudIcp icp(bench().tracer, 0, noisy());
+    const auto refuses = [&](std::span<const RangePoint> some, const Rigid3& start, double search_m,
+                             const std::string& why) {
+        const auto e = icp.align(some, {}, start, search_m);
+        ASSERT_TRUE(e) << e.error().text();
+        EXPECT_EQ(e->answer.kind, AnswerKind::refused);
+        EXPECT_NE(e->answer.why.find(why), std::string::npos) << e->answer.why;
+    };
+    refuses({}, T, 0, "only 0 of 0 returns meet the target where it is taken to be, expected at least 6");
+    refuses({}, T, 1, "only 0 of 0 returns");
+    refuses(points, {T.q, -T.t}, 0, "returns meet the target");
+    refuses(std::span(points).first(5), T, 0, "of 5 returns meet the target");
+    refuses(std::span(points).first(20), T, 0, "expected 90 % with a confidence of 95 %: 29 or more if all do");
+}
+
 TEST(IcpSweeps, BadInputIsReported) {
     std::mt19937_64 random(16);
     const Rigid3 T = truth(random);
@@ -393,8 +412,6 @@ TEST(IcpSweeps, BadInputIsReported) {
         ASSERT_FALSE(e);
         EXPECT_NE(e.error().text().find(what), std::string::npos) << e.error().text();
     };
-    says(icp.align({}, {}, T), "only 0 of 0 beams");
-    says(icp.align(points, {}, {T.q, -T.t}), "beams meet the target");
     says(icp.align(points, {{kNan, 0, 0}, {}}, T), "motion during the sweep");
     says(icp.align(points, {}, {{2, 0, 0, 0}, T.t}), "unit quaternion");
     says(icp.align(points, {}, T, -1), "search_m = -1");

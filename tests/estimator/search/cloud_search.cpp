@@ -111,8 +111,9 @@ TEST(CloudSearch, BadInputIsReported) {
     LidarSweep sweep = target.sweep(anywhere(random), random);
     EXPECT_NE(target.find(sweep, {.attitudes = 0}).error().text().find("at least 1"), std::string::npos);
     const auto nothing = target.find({});
-    ASSERT_FALSE(nothing);
-    EXPECT_NE(nothing.error().text().find("a pose of 0 points"), std::string::npos) << nothing.error().text();
+    ASSERT_TRUE(nothing) << nothing.error().text();
+    EXPECT_EQ(nothing->answer.kind, AnswerKind::refused);
+    EXPECT_NE(nothing->answer.why.find("a pose of 0 points"), std::string::npos) << nothing->answer.why;
     sweep.points[0].range_m = -1;
     EXPECT_NE(target.find(sweep).error().text().find("point 0 of the sweep"), std::string::npos);
 }

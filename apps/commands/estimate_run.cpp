@@ -1,0 +1,185 @@
+#include "apps/commands/estimate_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "apps/warnings.h"
+#include "base/write_file.h"
+#include "emulator/log/run_record.h"
+#include "emulator/replay/replay.h"
+#include "emulator/replay/sweep_replay.h"
+#include "emulator/threads.h"
+#include "tracking/estimate_report.h"
+#include "tracking/frame_tracker.h"
+#include "tracking/sweep_tracker.h"
+
+namespace narpa::cli {
+namespace {
+
+/// What was estimated, from what, and how.
+struct Subject {
+    std::string kind, sensor, target, method;  ///< kind: "camera" or "lidar"
+    std::string scene, item;                   ///< item: "frame" or "sweep"
+};
+
+/// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
+Result<std::vector<TrackedFrame>> track(const RunEstimate& o, Replay& run, FrameTracker& tracker) {
+    TracingThreads threads(o.threads);
+    Progress progress("estimating poses of " + o.folder);
+    std::vector<TrackedFrame> tracked;
+    for (std::size_t i = 0; i < run.frames().size(); i += static_cast<std::size_t>(o.every)) {
+        progress.show(static_cast<double>(i) / static_cast<double>(run.frames().size()),
+                      fmt::format("frame {} of {}", i + 1, run.frames().size()));
+        const FrameLedger& ledger = run.frames()[i].ledger;
+        if (!run.has_image(i) || ledger.delivery != Delivery::frame) continue;
+        std::vector<std::string> differs;
+        threads.arena.execute([&] {
+            differs = run.make(i);
+            tracked.push_back(tracker.take(ledger, run.bytes(), run.placement(i)));
+        });
+        if (!differs.empty())
+            return Error{
+                fmt::format("frame {} is not the run's any more: {}; expected the scene and the program as they "
+                            "were",
+                            ledger.frame, differs.front()),
+                o.folder + "/" + run.camera().name + ".ledger.csv", run.frames()[i].line};
+    }
+    return tracked;
+}
+
+LidarSweep decoded(const ReplayedSweep& made, const LidarModel& unit) {
+    LidarSweep sweep;
+    SweepReader reader(unit);
+    for (const ReplayedSweep::Packet& p : made.packets) reader.append(p.bytes, p.t_ns - made.t_ns, sweep);
+    return sweep;
+}
+
+/// Makes the sweeps again and tracks the target through them.
+Result<std::vector<TrackedFrame>> track(const RunEstimate& o, SweepReplay& run, SweepTracker& tracker) {
+    TracingThreads threads(o.threads);
+    Progress progress("estimating poses of " + o.folder);
+    std::vector<TrackedFrame> tracked;
+    std::size_t others = 0;
+    ReplayedSweep made;
+    const auto next = [&] {
+        const bool is_made = run.next(tracked.empty() ? 0 : static_cast<std::size_t>(o.every) - 1, made);
+        if (is_made)
+            tracked.push_back(
+                tracker.take(made.sweep, made.t_ns, made.t_end_ns, decoded(made, *run.lidar().model)));
+        return is_made;
+    };
+    while (threads.arena.execute(next)) {
+        progress.show(fmt::format("sweep {}, t = {:.1f} s", made.sweep, 1e-9 * static_cast<double>(made.t_ns)));
+        if (made.repeats.value_or(true)) continue;
+        if (run.is_lockstep())
+            return Error{fmt::format("sweep {} is not the run's any more: expected the scene and the program as "
+                                     "they were",
+                                     made.sweep),
+                         run.log_file(), made.line};
+        ++others;
+    }
+    if (others > 0)
+        warn(
+            fmt::format("{}: {} of {} sweeps differ from those of the run: in real time, poses came too late for "
+                        "their packets",
+                        run.log_file(), others, tracked.size()));
+    return tracked;
+}
+
+Status write_rows(const std::string& path, const std::vector<TrackedFrame>& tracked) {
+    std::string rows = std::string(kEstimateHeader) + '\n';
+    for (const TrackedFrame& f : tracked) rows += estimate_row(f);
+    return write_file(path, rows);
+}
+
+Outcome report(const RunEstimate& o, const Subject& of, const std::vector<TrackedFrame>& tracked) {
+    const EstimateSummary summary = summarise(tracked);
+    say(fmt::format("{}: {} {}, target {}, by {}: {}", o.folder, of.kind, of.sensor, of.target, of.method,
+                    to_text(summary, of.item)));
+    if (!o.csv.empty())
+        if (auto written = write_rows(o.csv, tracked); !written) return written.error();
+    if (!o.picture.empty()) {
+        const std::string title =
+            fmt::format("{}: {} seen by {}, by {}", of.scene, of.target, of.sensor, of.method);
+        if (auto written = plot_estimates(o.picture, title, tracked); !written) return written.error();
+    }
+    for (const std::string& file : {o.csv, o.picture})
+        if (!file.empty()) say("wrote " + file);
+    return nlohmann::json{{"passed", summary.measured > 0},
+                          {"log", o.folder},
+                          {of.kind, of.sensor},
+                          {"target", of.target},
+                          {"method", of.method},
+                          {"summary", to_json(summary)}};
+}
+
+Outcome estimate_frames(const RunEstimate& o, const TrackerOptions& options) {
+    auto run = Replay::open(o.folder, o.sensor, o.scene);
+    if (!run) return run.error();
+    auto tracker = FrameTracker::create((*run)->world(), (*run)->camera_index(), options);
+    if (!tracker) return tracker.error();
+    const auto tracked = track(o, **run, **tracker);
+    if (!tracked) return tracked.error();
+    const Scene& scene = (*run)->world().scene();
+    return report(o,
+                  {"camera", (*run)->camera().name, scene.bodies[(*tracker)->target()].name,
+                   std::string(options.method->name), scene.name, "frame"},
+                  *tracked);
+}
+
+Outcome estimate_sweeps(const RunEstimate& o, const TrackerOptions& options) {
+    if (options.range_guess_m > 0)
+        return Error{"a range is guessed for frames, not for a sweep, which measures it", o.folder};
+    auto run = SweepReplay::open(o.folder, o.sensor, o.scene);
+    if (!run) return run.error();
+    auto tracker = SweepTracker::create((*run)->world(), (*run)->lidar_index(), options);
+    if (!tracker) return tracker.error();
+    const auto tracked = track(o, **run, **tracker);
+    if (!tracked) return tracked.error();
+    if (tracked->empty())
+        return Error{fmt::format("holds no whole sweep of LiDAR \"{}\": expected poses for {:g} s or more",
+                                 (*run)->lidar().name, 1 / (*run)->lidar().model->spec().rate_hz),
+                     o.folder};
+    const Scene& scene = (*run)->world().scene();
+    return report(
+        o, {"lidar", (*run)->lidar().name, scene.bodies[(*tracker)->target()].name, "icp", scene.name, "sweep"},
+        *tracked);
+}
+
+/// True if the named sensor is a LiDAR of the run's scene. Errors: a name that no sensor has.
+Result<bool> is_lidar(const RunEstimate& o) {
+    const auto record = read_run_record(o.folder);
+    if (!record) return record.error();
+    const auto scene = read_run_scene(*record, o.scene);
+    if (!scene) return scene.error();
+    if (o.sensor.empty()) return scene->cameras.empty();
+    std::string names;
+    const auto has = [&](const auto& sensors) {
+        for (const auto& s : sensors) names += (names.empty() ? "" : ", ") + s.name;
+        return std::ranges::any_of(sensors, [&](const auto& s) { return s.name == o.sensor; });
+    };
+    if (has(scene->cameras)) return false;
+    if (has(scene->lidars)) return true;
+    return Error{fmt::format("no camera or LiDAR named \"{}\", expected one of: {}", o.sensor, names), scene->file};
+}
+
+}  // namespace
+
+Outcome estimate_run(const RunEstimate& o, const TrackerOptions& tracker) {
+    if (auto made = make_folder_of(o.csv); !made) return made.error();
+    if (auto made = make_folder_of_picture(o.picture); !made) return made.error();
+    const auto of_sweeps = is_lidar(o);
+    if (!of_sweeps) return of_sweeps.error();
+    const std::vector<std::string>& others = *of_sweeps ? o.of_frames : o.of_sweeps;
+    if (!others.empty())
+        return Error{fmt::format("{} goes with {}", others.front(),
+                                 *of_sweeps ? "frames, and sweeps of a LiDAR are estimated"
+                                            : "sweeps, expected --lidar NAME too"),
+                     o.folder};
+    return *of_sweeps ? estimate_sweeps(o, tracker) : estimate_frames(o, tracker);
+}
+
+}  // namespace narpa::cli

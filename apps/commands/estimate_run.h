@@ -1,0 +1,24 @@
+/// apps/commands/estimate_run.h - `narpa estimate RUN`: poses from the frames or sweeps of a logged run.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/cli.h"
+#include "tracking/target_tracker.h"
+
+namespace narpa::cli {
+
+struct RunEstimate {
+    std::string folder;        ///< with the run's log
+    std::string sensor;        ///< name of a camera or LiDAR; empty: the first camera, else the first LiDAR
+    std::string scene;         ///< in place of the run's; empty: the run's
+    std::string csv, picture;  ///< files to write; empty: none
+    int every = 1, threads = 0;
+    std::vector<std::string> of_frames{},
+        of_sweeps{};  ///< options that were given and have no meaning for the other
+};
+
+[[nodiscard]] Outcome estimate_run(const RunEstimate& options, const TrackerOptions& tracker);
+
+}  // namespace narpa::cli

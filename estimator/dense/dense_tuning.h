@@ -127,6 +127,9 @@ inline constexpr double kPriorSigmas = 4, kGainOffMin = 1e-3;
 inline constexpr double kRendered_sigmas = 2, kRenderedLimits = 2, kRendered_px = 0.2;
 /// Largest number of steps in which light that the model lacks is solved: each is linear in it.
 inline constexpr int kLightsSolved = 3;
+/// A pose that turns by more than this part of the light's turn is not solved with it: 0.8 to 1.4 of cylinders and
+/// ellipsoids, 0.01 to 0.25 of bodies with flat faces (random frames).
+inline constexpr double kTurnsWithLight = 0.5;
 /// If a frame's own sampling noise is not known, it has at most that of this many samples a pixel: dense needs 16,
 /// and with one, a skew of 3 px passed as noise.
 inline constexpr double kFewestSamplesOfFrame = 8;

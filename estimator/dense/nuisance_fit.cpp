@@ -167,7 +167,9 @@ NuisanceFit fit_nuisance(const PhotometricImages& images, const Exposure& exposu
     NuisanceFit out;
     const Left left(sums.information);
     if (prior > 0) out.covariance = left.covariance(prior);
-    out.covariance_without_prior = left.covariance(0);
+    out.rotation_response = left.response.topRows(3).norm();
+    constexpr double kNoPrior = 100;  // times the prior: what residuals do not show is then not observed
+    out.covariance_without_prior = left.covariance(kNoPrior * prior);
     const MatrixN kept = left.determined();
     out.unknowns = static_cast<int>(kept.cols());
     if (out.unknowns == 0) return out;

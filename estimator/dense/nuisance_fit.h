@@ -25,6 +25,8 @@ struct NuisanceFit {
     /// Covariance that the nuisance adds to the pose if it is unknown: with the prior below (zero without one), and
     /// from the residuals alone.
     Matrix6 covariance = Matrix6::Zero(), covariance_without_prior = Matrix6::Zero();
+    /// Rotation of the pose for a unit of the nuisance, if it is not solved, rad.
+    double rotation_response = 0;
     /// The whole step with the nuisance: its amounts, in units of the columns, pose and exposure.
     std::vector<double> amounts{};
     Vector6 pose_step = Vector6::Zero();

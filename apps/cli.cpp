@@ -90,14 +90,19 @@ std::string version() {
 }  // namespace
 
 int finish(const Outcome& outcome, bool json) {
+    const auto with_warnings = [](nlohmann::json document) {
+        if (document.is_object() && !warnings().empty() && !document.contains("warnings"))
+            document["warnings"] = warnings();
+        return document;
+    };
     if (!outcome) {
         say("narpa: " + outcome.error().text());
-        if (json) print_json(to_json(outcome.error()));
+        if (json) print_json(with_warnings(to_json(outcome.error())));
         return exit_status(outcome.error().kind);
     }
     const Status strict = check_warnings();
     if (!strict) say("narpa: " + strict.error().text());
-    if (json && !outcome->is_null() && !print_json(*outcome)) return exit_status(ErrorKind::failed);
+    if (json && !outcome->is_null() && !print_json(with_warnings(*outcome))) return exit_status(ErrorKind::failed);
     if (outcome->contains("error")) return (*outcome)["error"]["exit_status"];
     if (!strict) return exit_status(strict.error().kind);
     return outcome->is_object() && !outcome->value("passed", true) ? exit_status(ErrorKind::failed) : 0;

@@ -10,7 +10,7 @@ namespace {
 /// Of the one command that a process runs.
 struct WarningState {
     bool strict = false;
-    int count = 0;
+    std::vector<std::string> texts{};
 };
 
 WarningState& warning_state() {
@@ -21,8 +21,12 @@ WarningState& warning_state() {
 }  // namespace
 
 void warn(std::string_view text) {
-    ++warning_state().count;
+    warning_state().texts.emplace_back(text);
     say(fmt::format("warning: {}", text));
+}
+
+const std::vector<std::string>& warnings() {
+    return warning_state().texts;
 }
 
 Option add_strict_to(Parser app) {
@@ -30,8 +34,8 @@ Option add_strict_to(Parser app) {
 }
 
 Status check_warnings(const std::string& file) {
-    const auto [strict, count] = warning_state();
-    if (!strict || count == 0) return Ok{};
+    const std::size_t count = warnings().size();
+    if (!warning_state().strict || count == 0) return Ok{};
     return Error{fmt::format("{} warning{}, expected none with --strict", count, count > 1 ? "s" : ""), file, 0, 0,
                  ErrorKind::failed};
 }

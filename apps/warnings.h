@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "apps/options.h"
 #include "base/result.h"
@@ -11,6 +12,9 @@ namespace narpa::cli {
 
 /// Prints "warning: TEXT" and counts it. For the thread that runs the command.
 void warn(std::string_view text);
+
+/// The texts so far.
+[[nodiscard]] const std::vector<std::string>& warnings();
 
 /// Adds --strict.
 Option add_strict_to(Parser app);

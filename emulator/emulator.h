@@ -46,6 +46,8 @@ public:
     [[nodiscard]] const std::vector<std::string>& notices() const noexcept { return notices_; }
     /// `run` was stopped by its flag: it did not end by itself.
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
+    /// In lockstep: the last client that sent commands left before the end that the options state.
+    [[nodiscard]] bool abandoned() const noexcept { return abandoned_; }
     /// The bodies with a can_id for which no command was accepted, by name and identifier; empty: none. After
     /// `run`.
     [[nodiscard]] std::string bodies_without_a_pose() const;
@@ -93,7 +95,7 @@ private:
     std::atomic<std::int64_t> t_ns_{0};
     std::atomic<bool> no_priority_{false};
     PageFaults page_faults_{};
-    bool stopped_ = false;
+    bool stopped_ = false, abandoned_ = false;
     std::vector<std::string> notices_;
 };
 

@@ -196,6 +196,7 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             waits_alone = left ? waits_alone + 1 : 0;
             if (waits_alone > kCommanderGraceWaits) {
                 notices_.push_back("the last client that sent commands has left the bus: the run has ended");
+                abandoned_ = end_ns_ != Clock::kNever;
                 break;
             }
             can_->bus().wait(kLockstepWaitNs);

@@ -107,6 +107,10 @@ std::vector<std::string> failures(const Emulator& emulator) {
             all.push_back(std::move(text));
     if (emulator.options().lockstep && made_nothing(emulator) && !stopped_while_waiting(emulator))
         all.push_back(why_nothing(emulator));
+    if (emulator.abandoned())
+        all.push_back(
+            fmt::format("the last client that sent commands left at {:.3f} s, expected at {:g} s, the end",
+                        static_cast<double>(emulator.t_ns()) * 1e-9, emulator.options().duration_s));
     return all;
 }
 

@@ -55,13 +55,13 @@ bool is_inside(const Tracer& tracer, const BodyPoses& at, int body, const Vec3& 
 }
 
 std::string size_words(const Vec3& size_m) {
-    if (size_m.x == size_m.y && size_m.y == size_m.z) return fmt::format("{:.3g} m across", size_m.x);
-    return fmt::format("{:.3g} x {:.3g} x {:.3g} m", size_m.x, size_m.y, size_m.z);
+    if (size_m.x == size_m.y && size_m.y == size_m.z) return fmt::format("{:.4g} m across", size_m.x);
+    return fmt::format("{:.4g} x {:.4g} x {:.4g} m", size_m.x, size_m.y, size_m.z);
 }
 
 std::string view_words(const BodyView& view) {
     if (view.inside) return fmt::format("{:.4g} m away, around it", view.distance_m);
-    if (std::isinf(view.size_px)) return fmt::format("{:.4g} m away, beside it", view.distance_m);
+    if (std::isinf(view.size_px)) return fmt::format("{:.4g} m away, larger than the view", view.distance_m);
     return fmt::format("{:.4g} m away, {:.3g} px", view.distance_m, view.size_px);
 }
 

@@ -383,15 +383,31 @@ UpdateResult PoseTracker::update(const PoseMeasurement& measurement) {
         "it cannot start a filter: expected finite numbers, unit quaternions, a positive definite covariance"};
     if (filter_) {
         result = filter_->update(measurement);
-        if (result.outcome != UpdateOutcome::gated || filter_->counts().gated_in_a_row < settings_.gated_in_a_row)
+        if (result.outcome == UpdateOutcome::taken) first_.reset();
+        const bool contradicts_the_first = first_ && result.outcome == UpdateOutcome::gated;
+        if (!contradicts_the_first &&
+            (result.outcome != UpdateOutcome::gated || filter_->counts().gated_in_a_row < settings_.gated_in_a_row))
             return result;
     }
-    auto made =
-        PoseFilter::create(settings_.filter, measurement, settings_.first_velocity_m_s, settings_.first_rate_rad_s);
+    const auto [velocity_m_s, rate_rad_s] = first_sigmas(measurement);
+    auto made = PoseFilter::create(settings_.filter, measurement, velocity_m_s, rate_rad_s);
     if (!made) return result;
     restarts_ += filter_ ? 1 : 0;
     filter_ = *std::move(made);
+    first_ = measurement;
     return {UpdateOutcome::taken, 0, ""};
+}
+
+/// Those of the settings, and at least the motion from the first measurement to this one, if the two contradict.
+std::array<double, 2> PoseTracker::first_sigmas(const PoseMeasurement& measurement) const {
+    std::array<double, 2> sigmas{settings_.first_velocity_m_s, settings_.first_rate_rad_s};
+    if (!filter_ || !first_ || measurement.t_ns <= first_->t_ns) return sigmas;
+    const double dt_s = 1e-9 * static_cast<double>(measurement.t_ns - first_->t_ns);
+    const auto in_frame = [](const PoseMeasurement& m) {
+        return Rigid3{m.q_frame_chaser, {}} * m.T_chaser_sensor * m.T_sensor_target;
+    };
+    const ApparentMotion motion = motion_between(in_frame(*first_), in_frame(measurement), dt_s);
+    return {std::max(sigmas[0], norm(motion.velocity_m_s)), std::max(sigmas[1], norm(motion.rate_rad_s))};
 }
 
 UpdateResult PoseTracker::update(const BeamVelocity& measurement) {

@@ -7,12 +7,14 @@
 /// Joseph's form. A late measurement is inserted at its own time and later ones are repeated.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <variant>
 #include <vector>
 
 #include "estimator/filter/motion_model.h"
+#include "estimator/pose/apparent_motion.h"
 
 namespace narpa {
 
@@ -171,13 +173,15 @@ public:
 
     /// Starts from a known state. Errors: those of PoseFilter::create; the filter then stays as it was.
     Status start(std::int64_t t_ns, const RelativeState& state, const Matrix12& covariance);
-    /// Updates the filter; starts it, or starts it again, from this measurement. Only a start allocates.
+    /// Updates the filter; starts it, or starts it again, from this measurement. Only a start allocates. A second
+    /// measurement that contradicts the first one starts it again at once, with a velocity and rate that are as
+    /// uncertain as the motion between the two.
     UpdateResult update(const PoseMeasurement& measurement);
     /// Bad before the filter has started.
     UpdateResult update(const BeamVelocity& measurement);
     UpdateResult update(const BeamRange& measurement);
     /// The next measurement starts the filter.
-    void stop() noexcept { filter_.reset(); }
+    void stop() noexcept { filter_.reset(), first_.reset(); }
 
     [[nodiscard]] bool started() const noexcept { return filter_.has_value(); }
     /// Requires started().
@@ -187,8 +191,11 @@ public:
     [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
 
 private:
+    [[nodiscard]] std::array<double, 2> first_sigmas(const PoseMeasurement& measurement) const;
+
     PoseTrackerSettings settings_;
     std::optional<PoseFilter> filter_;
+    std::optional<PoseMeasurement> first_;  ///< that started the filter, until it takes another
     std::uint64_t restarts_ = 0;
 };
 

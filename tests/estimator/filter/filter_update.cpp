@@ -237,5 +237,24 @@ TEST(FilterUpdate, NeedsNoHeap) {
     }
 }
 
+/// A lander at 35 m/s: its second pose contradicts a filter that takes its velocity for about 1 m/s.
+TEST(PoseTracker, FollowsATargetThatIsFasterThanItsFirstVelocity) {
+    for (const double speed_m_s : {0.5, 7.0, 35.0, 300.0}) {
+        PoseTracker tracker({});
+        Matrix6 covariance = Matrix6::Identity() * 1e-6;
+        covariance.bottomRightCorner<3, 3>() *= 1e2;
+        for (int k = 0; k < 10; ++k) {
+            const double t_s = 0.5 * k;
+            const UpdateResult result =
+                tracker.update(PoseMeasurement{.t_ns = k * 500'000'000LL,
+                                               .T_sensor_target = {{}, {1, 2, 800 - speed_m_s * t_s}},
+                                               .covariance = covariance});
+            EXPECT_EQ(result.outcome, UpdateOutcome::taken) << speed_m_s << " m/s, " << k << ": " << result.why;
+        }
+        EXPECT_LE(tracker.restarts(), 1u) << speed_m_s;
+        EXPECT_NEAR(tracker.filter().state().velocity_m_s.z, -speed_m_s, 0.1) << speed_m_s;
+    }
+}
+
 }  // namespace
 }  // namespace narpa

@@ -146,7 +146,9 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         fit.guess_error = options.guess_error;
         const bool exact = options.model == ModelUncertainty{};
         fit.residual = e.residual;
-        fit.residual_max = exact ? options.residual_max : options.residual_max_model_inexact;
+        fit.residual_max = !exact                   ? options.residual_max_model_inexact
+                           : frame_variance.empty() ? options.residual_max_noise_estimated
+                                                    : options.residual_max;
         if (options.rivals > 0 && fit.failed.empty()) test_model(m, options, e, fit);
         if (options.rivals > 0 && fit.failed.empty() && fit.observability.unobserved > 0)
             keep_guess_where_unobserved(m, T_camera_body_guess, options, e, fit);

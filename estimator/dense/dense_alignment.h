@@ -48,8 +48,10 @@ struct DenseOptions {
     /// early, from both sides. If the answer is far from the guess, the guess without the coarsest levels must not
     /// lead to a better one.
     int rivals = 2;
-    /// Largest accepted residual (DenseEstimate::residual): if the model is exact, and else.
-    double residual_max = 1.15, residual_max_model_inexact = 6;
+    /// Largest accepted residual (DenseEstimate::residual): if the model is exact and the frame's noise given; if
+    /// its noise is estimated, as that of details smaller than a pixel exceeds its stated variance; if the model is
+    /// not.
+    double residual_max = 1.15, residual_max_noise_estimated = 2, residual_max_model_inexact = 6;
 };
 
 enum class DenseStatus : std::uint8_t {

@@ -286,7 +286,9 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         compare_with_mirrored(frame, at, guess, motion, e, fit);
     e.covariance_of_model =
         covariance_by(joined(image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal), e.by_light));
-    if (fit.failed.empty() && e.has_pose())
+    // With a rolling shutter that is told, matches of renders over time have errors of their own that grow with the
+    // row.
+    if (fit.failed.empty() && e.has_pose() && times_.row_s == 0)
         fit.failed = why_untold(kProgressiveRows, e.rows.sigmas, e.rows.shift, e.covariance);
     e.covariance += e.covariance_of_model, e.bound += e.covariance_of_model;
     if (e.has_pose()) {

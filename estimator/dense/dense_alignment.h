@@ -51,7 +51,7 @@ struct DenseOptions {
     /// Largest accepted residual (DenseEstimate::residual): if the model is exact and the frame's noise given; if
     /// its noise is estimated, as that of details smaller than a pixel exceeds its stated variance; if the model is
     /// not.
-    double residual_max = 1.15, residual_max_noise_estimated = 2, residual_max_model_inexact = 6;
+    double residual_max = 1.15, residual_max_noise_estimated = 6, residual_max_model_inexact = 6;
 };
 
 enum class DenseStatus : std::uint8_t {

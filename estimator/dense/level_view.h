@@ -35,6 +35,7 @@ public:
               double pixels_averaged, const Window& window, std::size_t target, const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
+    [[nodiscard]] const RowTimes& row_times() const noexcept { return times_; }
     /// Like ModelView::begin_frame; `times`: of the rows of `camera`. `model`: its uncertainty of brightness and
     /// light increases the pixels' expected variance. `T_world_camera`: DenseOptions.
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,

@@ -14,6 +14,8 @@ using Column = std::vector<float>;
 /// Rows of a frame that are exposed one after the other: each sees another pose.
 /// `unknowns`: components of the motion, from the first one on.
 NuisanceColumns rows_of_motion(const SuspectScene& s, int first, std::size_t unknowns) {
+    // A rolling shutter that is told is in the renders, with the error of few moments for each row.
+    if (s.view.row_times().row_s != 0) return {};
     NuisanceColumns columns(unknowns, Column(s.images.signal.size()));
     const double middle = 0.5 * (s.images.height - 1);
     for (std::size_t p = 0; p < s.images.signal.size(); ++p) {

@@ -96,8 +96,8 @@ TEST_F(PatternLidars, AFlashFiresAllAtOnce) {
     for (const auto& [t_ns, shot] : shots) EXPECT_EQ(t_ns, 0);
     // Evenly spaced on a plane: the corner's cell is half a cell inside of the field of view.
     const Vec3 corner = shots.front().second.direction;
-    EXPECT_NEAR(corner.x / corner.y, -std::tan(30 * kDegree) * 29 / 30, 1e-12);
-    EXPECT_NEAR(corner.z / corner.y, std::tan(20 * kDegree) * 19 / 20, 1e-12);
+    EXPECT_NEAR(corner.x / corner.y, -std::tan(30 * kRadPerDeg) * 29 / 30, 1e-12);
+    EXPECT_NEAR(corner.z / corner.y, std::tan(20 * kRadPerDeg) * 19 / 20, 1e-12);
 }
 
 /// Inside of the sphere, whose points all light each other evenly: rho^2 W / (4 pi R^2) more light at each, W being
@@ -116,7 +116,7 @@ TEST_F(PatternLidars, APulseOfAFlashLightsItsWholeField) {
                      static_cast<double>(truth.reflectivity) / (truth.range_m * truth.range_m);
         }
     }
-    const double a = std::tan(30 * kDegree), b = std::tan(20 * kDegree),
+    const double a = std::tan(30 * kRadPerDeg), b = std::tan(20 * kRadPerDeg),
                  solid_angle = 4 * std::atan(a * b / std::sqrt(1 + a * a + b * b));
     const double expected = 0.36 * solid_angle / (4 * kPi * 900);
     EXPECT_NEAR(light / shots, expected, 0.08 * expected);
@@ -130,8 +130,8 @@ TEST_F(PatternLidars, ARasterFiresCellAfterCellThereAndBack) {
         const std::size_t row = i / 30, column = row % 2 == 0 ? i % 30 : 29 - i % 30;
         const LidarShot& shot = shots[i].second;
         EXPECT_NEAR(static_cast<double>(shots[i].first), 150e3 * static_cast<double>(i), 1);
-        EXPECT_NEAR(shot.azimuth_rad, (2 * static_cast<double>(column) - 29) * kDegree, 1e-12);
-        EXPECT_NEAR(shot.elevation_rad, (19 - 2 * static_cast<double>(row)) * kDegree, 1e-12);
+        EXPECT_NEAR(shot.azimuth_rad, (2 * static_cast<double>(column) - 29) * kRadPerDeg, 1e-12);
+        EXPECT_NEAR(shot.elevation_rad, (19 - 2 * static_cast<double>(row)) * kRadPerDeg, 1e-12);
     }
 }
 
@@ -144,7 +144,7 @@ TEST_F(PatternLidars, ASpinningOneGoesRound) {
     for (std::size_t i = 0; i < shots.size(); ++i) {
         const int beam = static_cast<int>(i % 3);
         EXPECT_NEAR(static_cast<double>(shots[i].first), 0.5e6 * static_cast<double>(i / 3), 1);
-        EXPECT_NEAR(shots[i].second.azimuth_rad, (3.6 * static_cast<double>(i / 3) + 1 - beam) * kDegree, 1e-12);
+        EXPECT_NEAR(shots[i].second.azimuth_rad, (3.6 * static_cast<double>(i / 3) + 1 - beam) * kRadPerDeg, 1e-12);
     }
 }
 

@@ -57,7 +57,7 @@ nlohmann::json describe(const Body& body, const Mark& m) {
                      {"attitude_wxyz", {q.w, q.x, q.y, q.z}}});
     } else {
         mark["radius_m"] = m.radius_m;
-        if (!m.is_ball) mark["normal"] = {z.x, z.y, z.z};
+        if (!m.is_spherical) mark["normal"] = {z.x, z.y, z.z};
     }
     return mark;
 }
@@ -71,9 +71,8 @@ Status write_calibration(const Scene& scene, const std::string& folder) {
     nlohmann::json document{
         {"conventions",
          "camera: x right, y down, z forward, centre of the top-left pixel (0, 0); LiDAR: x right, y forward, "
-         "z up; position and attitude take sensor coordinates to the mount's; quaternions w, x, y, z; marks: "
-         "position, "
-         "normal and attitude in their body's axes, of a tag x right, y up, z out of its image"},
+         "z up; position and attitude take sensor coordinates to the mount's; quaternions w, x, y, z; "
+         "marks: position, normal and attitude in their body's axes, of a tag x right, y up, z out of its image"},
         {"cameras", nlohmann::json::array()},
         {"lidars", nlohmann::json::array()},
         {"marks", nlohmann::json::array()}};

@@ -54,6 +54,8 @@ private:
     [[nodiscard]] bool is_clear(const Mark& mark, const DiscView& view, const Rigid3& T_camera_target) const;
     [[nodiscard]] MarkFit without_wrong_marks(MarkPoints points, const Rigid3& near,
                                               const ApparentMotion& motion) const;
+    /// Empty if the fit uses most of the discs that nothing hides; else what is missing.
+    [[nodiscard]] std::string too_few(const MarkFit& fitted) const;
     void state(const MarkFit& fitted, const ApparentMotion& motion, MarkEstimate& e, Fit& fit) const;
 
     const RenderScene& render_scene_;

@@ -16,9 +16,8 @@ namespace {
 constexpr std::array<double, 5> kGates_px{4, 12, 36, 108, 324};
 /// Width of the border around these that is searched too, for the density of blobs.
 constexpr double kBorder_px = 40;
-constexpr double kLeastRadius_px = 0.45;  ///< smaller discs are single pixels, or none
-constexpr std::size_t kMostBlobs = 60;    ///< of a size
-constexpr std::size_t kMostPairs = 20;    ///< of marks
+constexpr std::size_t kMostBlobs = 60;  ///< of a size
+constexpr std::size_t kMostPairs = 20;  ///< of marks
 constexpr int kFewestMatches = 4;
 constexpr double kMostByChance = 1e-3;
 /// The guess as a prior: its standard deviations, of attitude and as a part of the range.
@@ -63,7 +62,7 @@ public:
         : marks_(marks), image_(image), sensor_(sensor), model_(model), guess_(guess) {
         for (const Mark* mark : marks) {
             auto view = disc_view(*mark, guess, model);
-            const bool is_seen = view && is_inside(view->centroid) && view->radius_px > kLeastRadius_px;
+            const bool is_seen = view && is_in_view(*view, image.width, image.height);
             if (is_seen) ++in_view_;
             views_.push_back(is_seen ? view : std::nullopt);
         }
@@ -76,24 +75,21 @@ public:
         for (const double gate : kGates_px) {
             find(gate);
             const Assignment found = match_within(gate);
-            out.reliable = found.matched >= kFewestMatches && by_chance(found) < kMostByChance;
-            if (found.matched > out.matched || out.reliable) {
+            const bool reliable = found.matched >= kFewestMatches && by_chance(found) < kMostByChance;
+            if (found.matched > out.matched || (reliable && !out.reliable)) {
+                out.reliable = reliable;
                 out.matched = found.matched, out.T_camera_body = found.T_camera_body;
                 for (std::size_t m = 0; m < marks_.size(); ++m) {
                     out.blobs[m].reset();
                     if (found.blob[m] >= 0) out.blobs[m] = blobs_[static_cast<std::size_t>(found.blob[m])];
                 }
             }
-            if (out.reliable) break;
+            if (out.reliable && 2 * out.matched >= in_view_) break;
         }
         return out;
     }
 
 private:
-    [[nodiscard]] bool is_inside(const Pixel& p) const {
-        return p.u > 0 && p.v > 0 && p.u < image_.width - 1 && p.v < image_.height - 1;
-    }
-
     /// Pairs of large marks that lie far apart: these determine a pose best.
     void choose_pairs() {
         std::vector<std::pair<double, std::array<std::size_t, 2>>> pairs;

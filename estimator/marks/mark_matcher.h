@@ -25,8 +25,9 @@ struct MarkMatches {
 
 /// Two blobs near where the guess has two marks give a pose, with the guess as a weak prior; the pose that explains
 /// most marks is taken (Fischler and Bolles 1981, without chance). Blobs are searched ever further from the guess,
-/// until the agreement is too good for chance: fewer than 1 in 1000 such agreements are expected among blobs of
-/// this density (Desolneux, Moisan and Morel, "Meaningful alignments", 2000).
+/// until half of the marks in view are found and the agreement is too good for chance: fewer than 1 in 1000 such
+/// agreements are expected among blobs of this density (Desolneux, Moisan and Morel, "Meaningful alignments",
+/// 2000).
 [[nodiscard]] MarkMatches match_marks(std::span<const Mark* const> marks, const MeasuredImage& image,
                                       const SensorModel& sensor, const CameraModel& model, const Rigid3& guess);
 

@@ -10,15 +10,16 @@ namespace {
 /// Least cosine between a disc's normal and the line of sight: flatter discs are thin lines in the image.
 constexpr double kLeastCosine = 0.2;
 constexpr int kRimPoints = 24;
+constexpr double kLeastRadius_px = 0.45;  ///< smaller discs are single pixels, or none
 
-/// The disc whose rim a camera sees, in camera axes. Of a ball: where the lines of sight touch it.
+/// The disc whose rim a camera sees, in camera axes. Of a sphere: where the lines of sight touch it.
 struct SeenDisc {
     Vec3 centre_m, normal;
     double radius_m;
 };
 SeenDisc seen_disc(const Mark& mark, const Rigid3& T_camera_mark) {
     const Vec3 centre = T_camera_mark.t;
-    if (!mark.is_ball) return {centre, T_camera_mark.q * Vec3{0, 0, 1}, mark.radius_m};
+    if (!mark.is_spherical) return {centre, T_camera_mark.q * Vec3{0, 0, 1}, mark.radius_m};
     const double d = norm(centre), part = std::min(1.0, mark.radius_m / d);
     return {(1 - part * part) * centre, (-1 / d) * centre, mark.radius_m * std::sqrt(1 - part * part)};
 }
@@ -53,6 +54,11 @@ std::optional<DiscView> disc_view(const Mark& mark, const Rigid3& T_camera_body,
                     .centroid = {centre->x + u / area, centre->y + v / area},
                     .radius_px = std::sqrt(std::abs(area) / kPi),
                     .area_px2 = std::abs(area)};
+}
+
+bool is_in_view(const DiscView& view, int width, int height) {
+    const Pixel& p = view.centroid;
+    return p.u > 0 && p.v > 0 && p.u < width - 1 && p.v < height - 1 && view.radius_px > kLeastRadius_px;
 }
 
 std::array<Vec3, 4> tag_corners(const Mark& mark) {

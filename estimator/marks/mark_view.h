@@ -22,6 +22,9 @@ struct DiscView {
 [[nodiscard]] std::optional<DiscView> disc_view(const Mark& mark, const Rigid3& T_camera_body,
                                                 const CameraModel& model);
 
+/// True if a blob finder may find it: larger than a pixel, and its centroid inside the image.
+[[nodiscard]] bool is_in_view(const DiscView& view, int width, int height);
+
 /// Corners of a tag's black square in the body's frame: top left, top right, bottom right, bottom left of its
 /// image.
 [[nodiscard]] std::array<Vec3, 4> tag_corners(const Mark& mark);

@@ -75,7 +75,7 @@ struct CameraMethod {
     bool light_is_that_of_the_guess = false;
     /// Factor on the variance of an error for filters, which take errors of consecutive frames as independent.
     double variance_between_frames = 1;
-    /// Null, or what is wrong with a target that the method cannot use.
+    /// An Error where the method cannot use a target; null: it can use any.
     Status (*needs)(const Scene& scene, std::size_t target) = nullptr;
     /// `render_scene` outlives the estimator. `target`: index of the body.
     std::unique_ptr<FrameEstimator> (*make)(const RenderScene& render_scene, const Camera& camera,

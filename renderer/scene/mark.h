@@ -28,7 +28,7 @@ inline constexpr std::array<TagDictionary, 21> kTagDictionaries{{
 
 struct Mark {
     enum class Kind : std::uint8_t {
-        lamp,       ///< a disc, or a ball, that shines
+        lamp,       ///< a disc or sphere that shines
         reflector,  ///< the same, bright in the light of a lamp beside the camera
         tag,        ///< a square tag of a dictionary
     };
@@ -38,11 +38,11 @@ struct Mark {
     Kind kind = Kind::lamp;
     /// Origin: its optical centre. z: out of its face. Of a tag, x is right and y up in its image.
     Rigid3 T_body_mark{};
-    bool is_ball = false;  ///< of a lamp or reflector: it looks the same from all sides
-    double radius_m = 0;   ///< lamp, reflector
-    int dictionary = 0;    ///< tag: index in kTagDictionaries
-    int id = 0;            ///< tag
-    double side_m = 0;     ///< tag: of its black square
+    bool is_spherical = false;  ///< of a lamp or reflector: a sphere, not a disc
+    double radius_m = 0;        ///< lamp, reflector
+    int dictionary = 0;         ///< tag: index in kTagDictionaries
+    int id = 0;                 ///< tag
+    double side_m = 0;          ///< tag: of its black square
 };
 
 }  // namespace narpa

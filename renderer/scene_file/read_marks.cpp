@@ -67,7 +67,7 @@ Mark read_mark(TableReader& table, std::vector<std::string>& names) {
     } else {
         table.read("radius_m", mark.radius_m);
         const auto normal = table.direction("normal");
-        mark.is_ball = !table.has("normal");
+        mark.is_spherical = !table.has("normal");
         if (normal) mark.T_body_mark.q = facing(*normal);
     }
     table.finish();

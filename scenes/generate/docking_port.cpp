@@ -186,12 +186,12 @@ void hatch_and_target(Mesh& mesh) {
 
 /// A lamp whose bright disc of this radius faces the chaser, on a wide black housing: from every side its centre is
 /// the optical centre, and nothing bright is seen beside it.
-void lamp(Mesh& mesh, const Vec3& optical_centre, double radius, double depth) {
+void lamp(Mesh& mesh, const char* material, const Vec3& optical_centre, double radius, double depth) {
     constexpr double kDisc = 0.0005, kHousing = 1.8;
     mesh.material("black");
     lathe(mesh, {{}, optical_centre},
           {{-depth, 0}, {-depth, kHousing * radius}, {-kDisc, kHousing * radius}, {-kDisc, 0}}, 24);
-    mesh.material("lamp");
+    mesh.material(material);
     lathe(mesh, {{}, optical_centre}, {{-kDisc, 0}, {-kDisc, radius}, {0, radius}, {0, 0}}, 24);
 }
 
@@ -200,7 +200,8 @@ void lamp(Mesh& mesh, const Vec3& optical_centre, double radius, double depth) {
 void lights(Mesh& mesh) {
     mesh.begin("port_lights", "dark_grey");
     for (int k = 0; k < 8; ++k)  // four near the target, four on the hatch's ring
-        lamp(mesh, k % 2 ? polar(-0.404, 0.452, k * kPi / 4) : polar(-0.412, 0.245, k * kPi / 4), 0.012, 0.02);
+        lamp(mesh, "lamp", k % 2 ? polar(-0.404, 0.452, k * kPi / 4) : polar(-0.412, 0.245, k * kPi / 4), 0.012,
+             0.02);
     struct Post {
         double x, angle_deg;
     };
@@ -209,7 +210,7 @@ void lights(Mesh& mesh) {
         const double angle = angle_deg * kPi / 180;
         mesh.material("aluminium");
         tube(mesh, polar(-0.55, 0.95, angle), polar(x - 0.03, 1.12, angle), 0.02, 10);
-        lamp(mesh, polar(x, 1.12, angle), 0.035, 0.05);
+        lamp(mesh, "post_lamp", polar(x, 1.12, angle), 0.035, 0.05);
     }
 }
 

@@ -131,7 +131,8 @@ std::vector<MaterialSpec> scene_materials() {
         {"ring_face", {0.55, 0.55, 0.56}, {0.20, 0.20, 0.20}, 18, "ring.png"},
         {"black", {0.03, 0.03, 0.03}},
         {"target_white", {0.70, 0.70, 0.70}, {}, 1, {}, {45, 45, 45}},  // edge-lit, so that it is seen in shadow
-        {"lamp", {0.05, 0.05, 0.05}, {}, 1, {}, {320, 320, 307}},       // as bright in shadow as in sunlight
+        {"lamp", {0.05, 0.05, 0.05}, {}, 1, {}, {250, 250, 240}},       // as bright in shadow as in sunlight
+        {"post_lamp", {0.05, 0.05, 0.05}, {}, 1, {}, {320, 320, 307}},  // seen from farther away
     };
 }
 

@@ -318,6 +318,8 @@ def check_settings():
     for command in (["check"], ["render", "-o", folder / "strict.png"], ["map", "-o", folder / "strict.pfm"]):
         error = narpa(command[0], scene, *command[1:], "--strict", status=1).stderr.decode()
         expect(re.search(r"warnings?, expected none with --strict", error), f"{command[0]} --strict: {error[-200:]}")
+        document = json.loads(narpa(command[0], scene, *command[1:], "--strict", "--json", status=1).stdout)
+        expect(any("5.5 is unusual" in text for text in document["warnings"]), f"{command[0]} --strict --json: {document}")
     expect(not (folder / "strict.png").exists(), "and nothing is rendered")
 
 
@@ -370,7 +372,8 @@ def check_modes():
 
 
 def check_gone():
-    """`fly` fails if the emulator disappears before the end of the trajectory, but not if it was stopped."""
+    """`fly` fails if the emulator disappears before the end of the trajectory, but not if it was stopped; `run --duration` in lockstep
+    fails if its clients leave before."""
     flight = folder / "gone.csv"
     flight.write_text("t_s,body,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
                       + "".join(f"{0.1 * k:.1f},chaser,-10,0,0,1,0,0,0,0,0,0,0,0,0\n" for k in range(40)))  # fmt: skip
@@ -389,6 +392,15 @@ def check_gone():
             run.process.kill() if kill else run.stop()
             said = fly.communicate(timeout=600)[1]
         expect(fly.returncode == status and re.search(words, said), f"fly {mode}, emulator {'killed' if kill else 'stopped'}: status {fly.returncode}, {said[-300:]}")
+    for duration, status in (([], 0), (["--duration", "2"], 0), (["--duration", "30"], 1)):
+        bus = f"slcan:{support.free_port()}"
+        run = subprocess.Popen([support.NARPA, "run", str(support.SCENE), "--can", bus, "--video", f"{support.CAMERA}=none", "--lockstep", "--json", *duration],
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
+        subprocess.run([support.NARPA, "fly", str(flight), "--can", bus, "--lockstep", "--wait", "30"], stderr=subprocess.DEVNULL, timeout=600)
+        out, said = run.communicate(timeout=600)
+        left = re.search(r"failed: the last client that sent commands left at [34]\.\d+ s, expected at 30 s, the end", said)
+        expect(run.returncode == status and json.loads(out)["passed"] == (status == 0) and bool(left) == (status == 1),
+               f"run {duration}, commanded for 4 s: status {run.returncode}, {said[-300:]}")
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ except ImportError as error:
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python"))
 from narpa import logs, rotation
 
-# T_board_camera turned and shifted; position m, quaternion w, x, y, z.
+# Of the board: position m, quaternion w, x, y, z.
 POSES = ("0,0,0,1,0,0,0", "0.1,-0.05,0.08,0.985,0.1,-0.1,0.08", "-0.5,0.1,0,0.96,-0.05,0.2,-0.15")
 
 

@@ -88,7 +88,7 @@ FREE = {"scene/lidar/model", "scene/lidar/rate_hz", "scene/lidar/range_min_m", "
         "scene/lidar/returns", "scene/lidar/sub_rays", "scene/lidar/columns", "scene/render/seed",
         "lidar/lidar/rate_hz_min", "lidar/lidar/rate_hz_max", "lidar/lidar/range_resolution_m",
         "lidar/lidar/velocity_resolution_m_s", "lidar/lidar/name", "lidar/grid/fov_horizontal_deg",
-        "lidar/grid/fov_vertical_deg", "scene/body/can_id", "scene/camera/format",
+        "lidar/grid/fov_vertical_deg", "scene/body/can_id", "scene/body.mark/id", "scene/camera/format",
         "scene/camera.detector/black_level_dn"}
 # Keys of sections that share a table, described by a table of their own.
 SHARED = {"name", "mount", "position_m", "attitude_wxyz", "look_at", "up"}

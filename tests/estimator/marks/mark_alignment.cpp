@@ -1,6 +1,8 @@
 // The pose by lamps, reflectors and tags: where the scenes say that they are, within its covariance, or refused.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <optional>
 #include <random>
 
@@ -18,7 +20,7 @@
 namespace narpa {
 namespace {
 
-/// One body of a scene before its first camera, which looks at it from `eye` in the body's axes.
+/// The first body of a scene, and the scene's first camera, which may be anywhere.
 class MarkedTarget {
 public:
     MarkedTarget(const std::string& file, int factor) {
@@ -40,10 +42,11 @@ public:
     [[nodiscard]] const Camera& camera() const { return camera_; }
     [[nodiscard]] const std::vector<Mark>& marks() const { return scene_.bodies[0].marks; }
 
-    /// T_camera_target of a camera at `eye` that looks along -x, turned by a vector in its own axes.
-    [[nodiscard]] static Rigid3 seen_from(const Vec3& eye, const Vec3& turned = {}) {
+    /// T_camera_target of a camera at this position in the body's axes that looks along -x, rotated by a rotation
+    /// vector in its own axes.
+    [[nodiscard]] static Rigid3 seen_from(const Vec3& position_m, const Vec3& rotation_rad = {}) {
         const Quat facing{0.5, -0.5, -0.5, 0.5};  // camera x, y, z = body y, -z, -x
-        return inverse(Rigid3{normalized(facing * exp_rotation(turned)), eye});
+        return inverse(Rigid3{normalized(facing * exp_rotation(rotation_rad)), position_m});
     }
     [[nodiscard]] MeasuredImage frame(const Rigid3& T_camera_target, std::uint32_t number, int spp) const {
         ModelView view(*render_scene_, camera_, 0, at_);
@@ -126,9 +129,9 @@ TEST(Marks, CentroidOfADiscIsNotTheImageOfItsCentre) {
         }
     EXPECT_NEAR(view->centroid.u, u / sum, 0.15);  // of a radius of 100 px
     EXPECT_GT(std::abs(view->centroid.u - view->centre.u), 2);
-    // From behind it is not seen; a ball is.
+    // From behind it is not seen; a sphere is.
     EXPECT_FALSE(disc_view(mark, {{}, {0, 0, 1}}, model));
-    mark.is_ball = true;
+    mark.is_spherical = true;
     EXPECT_TRUE(disc_view(mark, {{}, {0, 0, 1}}, model));
 }
 
@@ -152,19 +155,26 @@ TEST_P(MarksAt, GiveThePoseWithinItsCovariance) {
     std::mt19937_64 random(11);
     std::normal_distribution<double> normal;
     const int trials = test::trials(6, 200);
-    double nees = 0;
+    double nees = 0, rotation_rad2 = 0, position_m2 = 0;
     int usable = 0;
     for (int i = 0; i < trials; ++i) {
-        const Vec3 eye{c.x_m, 0.02 * c.x_m * normal(random), 0.02 * c.x_m * normal(random)};
-        const Rigid3 T = MarkedTarget::seen_from(eye, 0.03 * Vec3{normal(random), normal(random), normal(random)});
+        const Vec3 position_m{c.x_m, 0.02 * c.x_m * normal(random), 0.02 * c.x_m * normal(random)};
+        const Rigid3 T =
+            MarkedTarget::seen_from(position_m, 0.03 * Vec3{normal(random), normal(random), normal(random)});
         const MarkEstimate e = alignment.align(c.target().frame(T, static_cast<std::uint32_t>(i), c.spp),
                                                displaced_by(c.off, c.off, T, random));
         if (!e.answer.usable()) continue;
         ++usable;
-        const double squared = normalised_error_squared(error_between(e.T_camera_target, T), e.covariance);
+        const Vector6 error = error_between(e.T_camera_target, T);
+        const double squared = normalised_error_squared(error, e.covariance);
         EXPECT_LT(squared, 50) << i << ": " << e.marks << " marks";
-        nees += squared;
+        nees += squared, rotation_rad2 += error.head<3>().squaredNorm(),
+            position_m2 += error.tail<3>().squaredNorm();
     }
+    RecordProperty("good_of", fmt::format("{} of {}", usable, trials));
+    RecordProperty("rms",
+                   fmt::format("{:.3g} deg, {:.3g} mm, NEES {:.2f}", 180 / kPi * std::sqrt(rotation_rad2 / usable),
+                               1e3 * std::sqrt(position_m2 / usable), nees / usable));
     EXPECT_GE(usable, trials - 1 - trials / 20);
     EXPECT_GT(nees / usable, c.nees_low);
     EXPECT_LT(nees / usable, c.nees_high);

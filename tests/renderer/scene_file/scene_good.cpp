@@ -52,10 +52,10 @@ TEST(SceneFile, ReadsMarks) {
     const Mark &lamp = s.bodies[0].marks[0], &mirror = s.bodies[0].marks[1], &tag = s.bodies[0].marks[2];
     EXPECT_EQ(lamp.name, "lamp");
     EXPECT_EQ(lamp.radius_m, 0.02);
-    EXPECT_FALSE(lamp.is_ball);
+    EXPECT_FALSE(lamp.is_spherical);
     expect_close(lamp.T_body_mark * Vec3{0, 0, 1}, {2, 0, 0.5}, 1e-15);  // its normal is the mark's z
     EXPECT_EQ(mirror.kind, Mark::Kind::reflector);
-    EXPECT_TRUE(mirror.is_ball);
+    EXPECT_TRUE(mirror.is_spherical);
     EXPECT_EQ(kTagDictionaries[static_cast<std::size_t>(tag.dictionary)].name, "APRILTAG_36h11");
     EXPECT_EQ(tag.id, 586);
     EXPECT_EQ(tag.side_m, 0.4);

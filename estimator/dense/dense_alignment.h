@@ -19,6 +19,7 @@
 
 #include "base/result.h"
 #include "estimator/dense/level_view.h"
+#include "estimator/dense/model_suspects.h"
 #include "estimator/uncertainty/answer.h"
 #include "estimator/uncertainty/model_uncertainty.h"
 
@@ -47,12 +48,10 @@ struct DenseOptions {
     /// early, from both sides. If the answer is far from the guess, the guess without the coarsest levels must not
     /// lead to a better one.
     int rivals = 2;
-    /// Largest accepted residual (DenseEstimate::residual): of frames whose noise is known, that is,
-    /// `frame_variance` is given and the model is exact; and of others.
-    double residual_max = 1.15, residual_max_noise_unknown = 6;
-    /// Largest accepted blur beyond the model's (DenseEstimate::blur), if the noise is known and independent
-    /// between pixels: chance exceeds it in 6 of 10^5 frames.
-    double blur_max = 4;
+    /// Largest accepted residual (DenseEstimate::residual): if the model is exact and the frame's noise given; if
+    /// its noise is estimated, as that of details smaller than a pixel exceeds its stated variance; if the model is
+    /// not.
+    double residual_max = 1.15, residual_max_noise_estimated = 6, residual_max_model_inexact = 6;
 };
 
 enum class DenseStatus : std::uint8_t {
@@ -82,7 +81,10 @@ struct DenseEstimate {
     double residual = 0;
     double excess_loss = 0;  ///< loss beyond that of noise, sum over `window`, about a chi-square
     Window window{};         ///< of the last level
-    double blur = 0;         ///< blur_score, standard deviations
+    /// PhotometricImages::sampling_factor with the samples of the last image; 1 if the frame's noise is known.
+    double sampling_factor = 1;
+    /// Tests for errors of the model, of answers that pass all others.
+    std::vector<Suspicion> suspicions{};
     Answer answer;
 
     /// Without the part of the model's uncertainty.
@@ -135,6 +137,9 @@ private:
                              Fit& fit);
     void test_by_start_near(const Measured& m, const Rigid3& guess, const DenseOptions& options, DenseEstimate& e,
                             Fit& fit);
+    void test_model(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit);
+    void keep_guess_where_unobserved(const Measured& m, const Rigid3& guess, const DenseOptions& options,
+                                     DenseEstimate& e, Fit& fit);
     void test_weak_motions(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit);
     /// Evaluates both losses over the same pixels: those about either pose.
     void evaluate_losses_on_common_pixels(const Measured& m, const DenseOptions& options, DenseEstimate& a,

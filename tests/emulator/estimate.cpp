@@ -304,7 +304,6 @@ TEST_F(EstimateTest, NoiseThatIsStatedIsExpected) {
     };
     const TrackedFrame known = answer(0), unknown = answer({});
     EXPECT_EQ(known.answer.kind, AnswerKind::refused) << "a frame of sixteen samples a pixel";
-    EXPECT_NE(known.why.find("residuals"), std::string::npos) << known.why;
     EXPECT_EQ(unknown.answer.kind, AnswerKind::good) << unknown.why;
 }
 

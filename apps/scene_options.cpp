@@ -206,7 +206,7 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
     app.option(dashes + "frame-noise", tracker.frame_noise_dn,
                "With " + camera_methods_that_take_noise() +
                    " or search: noise of the frames beside the detector's, standard deviation; 0 of a real "
-                   "camera (default: not known, so that only large residuals are refused)")
+                   "camera (default: estimated as sampling noise, which grows with the contrast in a pixel)")
         .type_name("DN")
         .range(0.0, 1e5);
     app.option(dashes + "seed", tracker.seed, "Seed of the first guess and of the renders").shows_default();

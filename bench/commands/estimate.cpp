@@ -16,6 +16,7 @@
 #include "bench/estimation/icp.h"
 #include "bench/estimation/pnp.h"
 #include "bench/estimation/stereo.h"
+#include "bench/estimation/untold_errors.h"
 #include "bench/statistics.h"
 #include "plot/plot.h"
 
@@ -362,6 +363,15 @@ Command add_bench_estimate(Parser bench_command) {
              fmt::format("consistency: {} (default: all)", fmt::join(kConsistencyConditions, ", ")))
         .comma_separated()
         .one_of({kConsistencyConditions.begin(), kConsistencyConditions.end()})
+        .type_name("LIST");
+    std::vector<std::string> untold{"all"};
+    for (const UntoldError& e : untold_errors()) untold.emplace_back(e.name);
+    c.option("--untold", o->consistency.untold,
+             fmt::format("consistency: instead of conditions, errors of the world that dense and features are not "
+                         "told of: {}; none: frames without error of which dense is not told the noise",
+                         fmt::join(untold, ", ")))
+        .comma_separated()
+        .one_of(untold)
         .type_name("LIST");
     c.option("--first-trial", o->first_trial, "consistency: number of the first").range(0, 1'000'000'000);
     c.option("--model-error", o->model_error,

@@ -1,5 +1,7 @@
 #include "bench/estimation/consistency.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -7,6 +9,7 @@
 #include <random>
 
 #include "bench/estimation/consistency_scenes.h"
+#include "bench/estimation/untold_errors.h"
 #include "estimator/cloud/cloud_icp.h"
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
@@ -24,6 +27,7 @@ namespace {
 constexpr double kRadius_m = 2;  ///< of the targets made in code, about
 constexpr RangeNoise kRangeNoise{0.02, 5.1e-5};
 constexpr std::string_view kWrong = "wrong";  ///< the condition that needs another target
+constexpr std::string_view kPlain = "plain", kNothing = "none", kAll = "all";
 
 /// Return model of a VLP-16 with 100 m of range, as the estimator assumes it: its detection limit is not stated.
 CertainReturn vlp16_returns() {
@@ -136,6 +140,10 @@ public:
             if (std::ranges::find(o.conditions, c) != o.conditions.end() ||
                 (o.conditions.empty() && (c != kWrong || targets_.size() > 1)))
                 conditions_.push_back(c);
+        for (const UntoldError& e : untold_errors())
+            if (std::ranges::find(o.untold, e.name) != o.untold.end() ||
+                (e.name != kNothing && std::ranges::find(o.untold, kAll) != o.untold.end()))
+                untold_.push_back(&e);
     }
 
     ConsistencyRow trial(const std::string& method, int number) {
@@ -147,10 +155,16 @@ public:
         row.condition = conditions_[d.index(conditions_.size())];
         row.target = method == "points" ? "random points" : target.scene.name;
         const bool lidar = method == "icp" || method == "icp-search";
+        Untold untold;
+        if (!untold_.empty()) {
+            untold = {untold_[d.index(untold_.size())], d.index(3)};
+            row.condition = kPlain;
+        }
         const Rigid3 truth = pose(target.radius_m, row.condition, lidar, d);
         const TrialResult out = method == "points" ? points(row.condition, d)
                                 : lidar            ? sweep(target, method, row.condition, truth, d)
-                                                   : frame(target, method, row.condition, truth, d);
+                                                   : frame(target, method, row.condition, untold, truth, d);
+        if (untold.error) row.condition = untold.name();
         ++row.answers[static_cast<std::size_t>(out.answer.kind)];
         if (out.answer.kind != AnswerKind::good) return row;
         const Vector6 error = error_between(out.T, method == "points" ? points_truth_ : truth);
@@ -162,6 +176,17 @@ public:
     }
 
 private:
+    /// An error in one of its sizes; none without one.
+    struct Untold {
+        const UntoldError* error = nullptr;
+        std::size_t size = 0;
+
+        [[nodiscard]] double amount() const { return error->sizes[size]; }
+        [[nodiscard]] std::string name() const {
+            return amount() == 0 ? std::string(error->name)
+                                 : fmt::format("{} {:g} {}", error->name, amount(), error->unit);
+        }
+    };
     /// Aimed nearly at the target, from 3 to 8 radii; `far`: from 15 to 40; `beside`: half of it is outside the
     /// image.
     [[nodiscard]] Rigid3 pose(double radius_m, std::string_view condition, bool lidar, Draw& d) const {
@@ -190,46 +215,55 @@ private:
     }
 
     TrialResult frame(KnownTarget& target, const std::string& method, std::string_view condition,
-                      const Rigid3& truth, Draw& d) {
-        const WorldErrors world = WorldErrors::draw(o_.world, o_.distortion, d);
+                      const Untold& untold, const Rigid3& truth, Draw& d) {
+        const WorldErrors errors = WorldErrors::draw(o_.world, o_.distortion, d);
         const ApparentMotion moving = motion(d);
         const KnownTarget& shown = condition == kWrong ? another(target, d) : target;
-        const Scene scene = world.applied(shown.scene);
-        std::optional<RenderScene> differs;
-        if (world.any_of_scene()) differs.emplace(*RenderScene::create(scene));
-        Camera camera = scene.cameras.front();
+        TrueWorld world{.scene = errors.applied(shown.scene),
+                        .camera = {},
+                        .T_camera_target = errors.seen(truth, moving),
+                        .target_radius_m = shown.radius_m};
+        Camera camera = world.scene.cameras.front();
         if (condition == "bright") camera.detector->exposure_s *= d.uniform(5, 40);
         if (condition == "dark") camera.detector->exposure_s /= d.uniform(5, 40);
-        Camera exposing = camera;
+        world.camera = camera;
         if (condition == "blurred")
-            exposing.optics.point_spread = PointSpreadFunction{.sigma_px = d.uniform(0.5, 2)};
-        if (world.distortion != 0)
-            exposing.model =
-                make_projection({&kBrownConrady, paraxial_pinhole(*camera.model), {world.distortion, 0, 0, 0}});
-        const BodyPoses at(1);
-        ModelView view(differs ? *differs : shown.render_scene, exposing, 0, at);
-        FrameSettings s;
-        s.seed = d.random();
-        s.spp = 64;
-        view.render(world.seen(truth, moving), s, false);
+            world.camera.optics.point_spread = PointSpreadFunction{.sigma_px = d.uniform(0.5, 2)};
+        if (errors.distortion != 0)
+            world.camera.model =
+                make_projection({&kBrownConrady, paraxial_pinhole(*camera.model), {errors.distortion, 0, 0, 0}});
+        if (untold.error) untold.error->apply(world, untold.amount(), d.random);
+        std::optional<RenderScene> differs;
+        if (errors.any_of_scene() || untold.error) differs.emplace(*RenderScene::create(world.scene));
+        ModelView view(differs ? *differs : shown.render_scene, world.camera, 0, BodyPoses(1));
+        view.begin_frame(BodyPoses(1), world.motion, row_times(world.camera));
+        world.settings.seed = d.random();
+        world.settings.spp = 64;
+        view.render(world.T_camera_target, world.settings, false);
+        RadianceImage light = view.radiance();
+        world.apply_gain(light);
         std::vector<std::uint8_t> bytes(
             frame_bytes({camera.width, camera.height, camera.format, camera.period_ns}));
-        expose(exposing, view.radiance(), d.random(), 0, bytes);
+        expose(world.camera, light, d.random(), 0, bytes);
         const auto image = measured_image(camera, bytes);
         const Rigid3 guess = start(truth, d);
         if (method == "features") {
             target.features->set_detector(*camera.detector);
-            const FeatureEstimate e = target.features->align(*image, at, guess, moving);
+            const FeatureEstimate e = target.features->align(*image, BodyPoses(1), guess, moving);
             return {e.answer, e.T_camera_target, e.covariance};
         }
-        const std::vector<float> variance = sampling_variance(view, world.seen(truth, moving), s, d.random);
+        std::vector<float> variance;  // unknown with an untold error, as in `narpa estimate`
         DenseOptions dense;
-        dense.samples_per_pixel = 32, dense.fineness = 4;
+        if (!untold.error) {
+            variance = sampling_variance(view, world.T_camera_target, world.settings, d.random);
+            dense.samples_per_pixel = 32;
+        }
+        dense.fineness = 4;
         dense.model = o_.told;
         dense.guess_error = {o_.start_deg * kDegree, 0.01 * o_.start_percent};
         dense.motion = moving;
         target.dense->set_detector(*camera.detector);
-        const auto e = target.dense->align(*image, at, guess, dense, variance);
+        const auto e = target.dense->align(*image, BodyPoses(1), guess, dense, variance);
         return {e->answer, e->T_camera_body, e->covariance};
     }
 
@@ -311,6 +345,7 @@ private:
     const ConsistencyOptions& o_;
     Targets targets_;
     std::vector<std::string_view> conditions_;
+    std::vector<const UntoldError*> untold_;
     PnpSolver solver_{64};
     Rigid3 points_truth_{};
 };
@@ -334,6 +369,10 @@ Result<std::vector<ConsistencyRow>> run_consistency(const ConsistencyOptions& o,
     if (!targets) return targets.error();
     if (targets->size() < 2 && std::ranges::find(o.conditions, kWrong) != o.conditions.end())
         return Error{"condition \"wrong\" shows another target, expected at least two targets"};
+    for (const std::string& method : o.methods)
+        if (!o.untold.empty() && method != "dense" && method != "features")
+            return Error{
+                fmt::format("untold errors are those of frames, expected dense or features, not \"{}\"", method)};
     Campaign campaign(o, *std::move(targets));
     std::map<std::array<std::string, 3>, ConsistencyRow> rows;
     for (const std::string& method : o.methods)

@@ -27,8 +27,12 @@ inline constexpr std::array<std::string_view, 7> kConsistencyConditions{"plain",
 
 struct ConsistencyOptions {
     std::vector<std::string> methods{kConsistencyMethods.begin(), kConsistencyMethods.end()};
-    std::vector<std::string> targets;         ///< as in consistency_scenes.h; empty: all that are made in code
-    std::vector<std::string> conditions;      ///< empty: all
+    std::vector<std::string> targets;     ///< as in consistency_scenes.h; empty: all that are made in code
+    std::vector<std::string> conditions;  ///< empty: all
+    /// Names of kinds of untold_errors.h; "all": each of them. Then each frame has one of them in one of its sizes
+    /// instead of a condition, and dense is not given the frame's sampling noise, as in `narpa estimate`. Methods
+    /// of frames only.
+    std::vector<std::string> untold{};
     int trials = 200;                         ///< of each method
     int size = 96;                            ///< pixels of the camera
     double start_deg = 5, start_percent = 5;  ///< the largest error of a start; each is drawn below it

@@ -119,7 +119,8 @@ LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window&
 
 void DenseAlignment::evaluate_losses_on_common_pixels(const Measured& m, const DenseOptions& options,
                                                       DenseEstimate& a, DenseEstimate& b) {
-    if (a.window == b.window) return;
+    if (a.window == b.window && a.sampling_factor == b.sampling_factor) return;
+    a.sampling_factor = b.sampling_factor = std::min(a.sampling_factor, b.sampling_factor);
     const Camera camera = coarser_camera(camera_, options.finest);
     const Window both = joined(a.window, b.window);
     LevelView& view = level(options.finest, camera, both, m, options);
@@ -143,13 +144,14 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         observe(e.T_camera_body, e.covariance, fit);
         compare_with_guess(e.T_camera_body, T_camera_body_guess, fit);
         fit.guess_error = options.guess_error;
-        const bool known = !frame_variance.empty() && options.model == ModelUncertainty{};
+        const bool exact = options.model == ModelUncertainty{};
         fit.residual = e.residual;
-        fit.residual_max = known ? options.residual_max : options.residual_max_noise_unknown;
-        if (known && has_independent_noise() && std::abs(e.blur) > options.blur_max && fit.failed.empty())
-            fit.failed =
-                fmt::format("{} blurred than the model, by {:.3g} standard deviations, expected at most {:g}",
-                            e.blur > 0 ? "more" : "less", std::abs(e.blur), options.blur_max);
+        fit.residual_max = !exact                   ? options.residual_max_model_inexact
+                           : frame_variance.empty() ? options.residual_max_noise_estimated
+                                                    : options.residual_max;
+        if (options.rivals > 0) test_model(m, options, e, fit);
+        if (options.rivals > 0 && fit.failed.empty() && fit.observability.unobserved > 0)
+            keep_guess_where_unobserved(m, T_camera_body_guess, options, e, fit);
     } else {
         fit.failed = name(e.status);
     }
@@ -187,7 +189,7 @@ void DenseAlignment::test_by_mirrored_starts(const Measured& m, const Rigid3& gu
 
 /// True if steps from the other's coarse result lead to the answer. Adds the variance of the two to the covariance.
 bool DenseAlignment::converges_to(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options) {
-    other.exposure = e.exposure, other.renders = 0;
+    other.exposure = e.exposure, other.sampling_factor = e.sampling_factor, other.renders = 0;
     const Camera camera = coarser_camera(camera_, options.finest);
     LevelView& finest = *levels_[level_number(options.finest)];
     LevelSolver solver(camera, render_scene_, target_, options.finest, finest, options, other);

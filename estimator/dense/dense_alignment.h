@@ -19,10 +19,13 @@
 
 #include "base/result.h"
 #include "estimator/dense/level_view.h"
+#include "estimator/dense/model_suspects.h"
 #include "estimator/uncertainty/answer.h"
 #include "estimator/uncertainty/model_uncertainty.h"
 
 namespace narpa {
+
+class LevelSolver;
 
 /// RMS error over the bound, docking scene at 16.6 m in 320 x 240 pixels, frames of 64 samples a pixel whose
 /// variance is given: 1.6 in attitude and 0.8 in position (4 frames). The scene has many details smaller than a
@@ -47,12 +50,9 @@ struct DenseOptions {
     /// early, from both sides. If the answer is far from the guess, the guess without the coarsest levels must not
     /// lead to a better one.
     int rivals = 2;
-    /// Largest accepted residual (DenseEstimate::residual): of frames whose noise is known, that is,
-    /// `frame_variance` is given and the model is exact; and of others.
-    double residual_max = 1.15, residual_max_noise_unknown = 6;
-    /// Largest accepted blur beyond the model's (DenseEstimate::blur), if the noise is known and independent
-    /// between pixels: chance exceeds it in 6 of 10^5 frames.
-    double blur_max = 4;
+    /// Largest accepted residual (DenseEstimate::residual): if the model is exact and the frame's noise given; if
+    /// its noise is estimated; if the model is not exact.
+    double residual_max = 1.15, residual_max_noise_estimated = 1.3, residual_max_model_inexact = 6;
 };
 
 enum class DenseStatus : std::uint8_t {
@@ -77,12 +77,16 @@ struct DenseEstimate {
     std::size_t chosen = 0;  ///< of these, pixels that the last steps use
     int renders = 0;         ///< images compared with the frame
     double misfit = 0;       ///< loss beyond that of noise, per target pixel: Robustness{1, 3, 0}
-    /// RMS residual over that expected from noise, without a robust loss: of the target's pixels, or of those that
-    /// determine the pose (PhotometricEquations::residual), whichever is larger.
+    /// RMS residual over that expected from noise: of the target's pixels, or of those that determine the pose
+    /// (PhotometricEquations::residual), whichever is larger. If the frame's noise is estimated: of the latter with
+    /// Cauchy's weights, as some details smaller than a pixel have far more noise than stated.
     double residual = 0;
     double excess_loss = 0;  ///< loss beyond that of noise, sum over `window`, about a chi-square
     Window window{};         ///< of the last level
-    double blur = 0;         ///< blur_score, standard deviations
+    /// PhotometricImages::sampling_factor with the samples of the last image; 1 if the frame's noise is known.
+    double sampling_factor = 1;
+    /// Tests for errors of the model, of answers that pass all others.
+    std::vector<Suspicion> suspicions{};
     Answer answer;
 
     /// Without the part of the model's uncertainty.
@@ -135,6 +139,10 @@ private:
                              Fit& fit);
     void test_by_start_near(const Measured& m, const Rigid3& guess, const DenseOptions& options, DenseEstimate& e,
                             Fit& fit);
+    void test_model(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit);
+    static void solve_light(LevelSolver& solver, DenseEstimate& e);
+    void keep_guess_where_unobserved(const Measured& m, const Rigid3& guess, const DenseOptions& options,
+                                     DenseEstimate& e, Fit& fit);
     void test_weak_motions(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit);
     /// Evaluates both losses over the same pixels: those about either pose.
     void evaluate_losses_on_common_pixels(const Measured& m, const DenseOptions& options, DenseEstimate& a,

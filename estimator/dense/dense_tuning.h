@@ -119,13 +119,23 @@ inline constexpr std::array kLinearityTests{LinearityTest{1, 4, 0.5}, LinearityT
 inline constexpr double kThirdStart_rad = 0.07;
 /// Other minima are searched from starts at this distance.
 inline constexpr double kSearchedBeside_sigmas = 8;
-/// The model does not fit if residuals are more than kResidualMax times their noise, or the gain is off its prior
-/// by more than kPriorSigmas standard deviations plus kGainOffMin, or the loss exceeds that of noise by more than
-/// kMisfitMax per pixel: station and cube in clean and saturated frames have 8.
-inline constexpr double kResidualMax = 4, kPriorSigmas = 4, kGainOffMin = 1e-3, kMisfitMax = 10;
+/// The model does not fit if the gain is off its prior by more than kPriorSigmas standard deviations plus
+/// kGainOffMin.
+inline constexpr double kPriorSigmas = 4, kGainOffMin = 1e-3;
 /// The weakest motions are rendered to both sides: by kRendered_sigmas standard deviations, at most kRenderedLimits
 /// times the limit of observed motions, at least kRendered_px pixels.
 inline constexpr double kRendered_sigmas = 2, kRenderedLimits = 2, kRendered_px = 0.2;
+/// Largest number of steps in which light that the model lacks is solved: each is linear in it.
+inline constexpr int kLightsSolved = 3;
+/// A pose that turns by more than this part of the light's turn is not solved with it: 0.8 to 1.4 of cylinders and
+/// ellipsoids, 0.01 to 0.25 of bodies with flat faces (random frames).
+inline constexpr double kTurnsWithLight = 0.5;
+/// Scale of Cauchy's weights that has 95 % efficiency for normal noise (P. W. Holland, R. E. Welsch, Commun.
+/// Statist. A6, 1977), and the RMS of normal residuals so weighted.
+inline constexpr double kResidualCauchy = 2.385, kResidualOfNormal = 0.764;
+/// If a frame's own sampling noise is not known, it has at most that of this many samples a pixel: dense needs 16,
+/// and with one, a skew of 3 px passed as noise.
+inline constexpr double kFewestSamplesOfFrame = 8;
 /// Upper limit of the measured response to a motion over the Jacobian's. Without it the 75 answers of largest
 /// response had NEES 7.1; with it 620 answers have 5.9.
 inline constexpr double kResponseMax = 1.3;

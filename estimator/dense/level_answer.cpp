@@ -13,7 +13,7 @@ namespace narpa {
 using namespace dense_tuning;
 
 void LevelSolver::finish() {
-    const PhotometricImages images = view_.images();
+    const PhotometricImages images = this->images();
     const PhotometricEquations last = equations(images, e_.exposure, robust_);
     // The remaining step is part of the error.
     const Vector6 remaining_step = ldlt_solve(last.pose_information(), last.pose_gradient());
@@ -28,26 +28,31 @@ void LevelSolver::finish() {
     e_.window = view_.window();
     e_.excess_loss = loss.excess();
     e_.misfit = e_.excess_loss / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
-    const PhotometricEquations plain =
-        equations(images, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0});
-    const double of_information = plain.residual();
-    e_.blur = blur_score(images, e_.exposure, plain);
-    e_.residual =
-        std::max(of_information, std::sqrt(loss.chi2 / static_cast<double>(std::max<std::size_t>(loss.pixels, 1))));
+    e_.residual = residual();
     const double off = std::abs(e_.exposure.gain - 1);
-    if (robust_.scale > kResidualMax || e_.misfit > kMisfitMax ||
-        off > kPriorSigmas * images.prior.gain_sigma + kGainOffMin)
+    if (off > kPriorSigmas * images.prior.gain_sigma + kGainOffMin)
         e_.status = DenseStatus::does_not_fit;
     else
         e_.covariance = covariance_by_response(of_noise, response_to_motions(last), kResponseMax) +
                         e_.covariance_of_model + remaining_step * remaining_step.transpose();
 }
 
+double LevelSolver::residual() const {
+    const PhotometricImages now = images();
+    if (now.measured_variance.empty() && o_.model == ModelUncertainty{})
+        return equations(now, e_.exposure, {1, kResidualCauchy, 0}).residual() / kResidualOfNormal;
+    const double of_information =
+        equations(now, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0}).residual();
+    const PhotometricCost all = cost(now, e_.exposure, {});
+    return std::max(of_information,
+                    std::sqrt(all.chi2 / static_cast<double>(std::max<std::size_t>(all.pixels, 1))));
+}
+
 /// Measures the response by central differences of renders with equal samples.
 Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     const std::vector<float> signal(view_.images().signal.begin(), view_.images().signal.end()),
         variance(view_.images().signal_variance.begin(), view_.images().signal_variance.end());
-    PhotometricImages here = view_.images();
+    PhotometricImages here = images();
     here.signal = signal, here.signal_variance = variance;
     const Observability o = observability_of(last.pose_covariance(), norm(e_.T_camera_body.t));
     settings_.spp = std::max(2, o_.samples_per_pixel);
@@ -69,14 +74,13 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
 LevelSolver::Rise LevelSolver::rise(int motions, double sigmas) {
     const Observability o = observability_of(e_.covariance_of_image(), norm(e_.T_camera_body.t));
     Rise rise{std::numeric_limits<double>::infinity(), 0};
-    for (int i = 0; i < motions; ++i)
+    for (int i = o.unobserved; i < motions; ++i)
         for (const double side : {-sigmas, sigmas}) {
             const Vector6 motion = side / std::sqrt(o.eigenvalues[i]) * o.motions.col(i);
             const Eigen::Vector2d step = equations_.exposure_step(motion);
             const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
             render(displaced(e_.T_camera_body, motion));
-            const double rises =
-                (cost(view_.images(), exposure, {}).robust - loss_when_linearised_) / (sigmas * sigmas);
+            const double rises = (cost(images(), exposure, {}).robust - loss_when_linearised_) / (sigmas * sigmas);
             rise = {std::min(rise.min, rises), std::max(rise.max, rises)};
         }
     return rise;
@@ -99,7 +103,7 @@ Matrix6 LevelSolver::covariance_of_model(const PhotometricEquations& equations) 
     if (o_.model.light_rad > 0) {
         render(e_.T_camera_body);  // with the same sampling noise as the image it is compared with
         PoseShifts by_light(6, 3);
-        const PhotometricImages images = view_.images();
+        const PhotometricImages images = this->images();
         for (int axis = 0; axis < 3; ++axis) {
             Vec3 turn{};
             turn[axis] = o_.model.light_rad;

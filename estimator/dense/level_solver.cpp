@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "estimator/dense/dense_tuning.h"
+#include "estimator/dense/sampling_noise.h"
 #include "estimator/least_squares/symmetric.h"
+#include "estimator/uncertainty/unobserved.h"
 #include "renderer/camera/scene_camera.h"
 
 namespace narpa {
@@ -70,7 +72,7 @@ DenseStatus LevelSolver::run(bool first) {
 
 /// `samples`: per pixel once pixels are chosen.
 DenseStatus LevelSolver::iterate(int samples) {
-    robust_.model_dn2 = coarse_ ? kCoarseModelPart * signal_power(view_.images()) : 0;
+    robust_.model_dn2 = coarse_ ? kCoarseModelPart * signal_power(images()) : 0;
     double damping = kDampingFirst;
     double least = std::numeric_limits<double>::infinity();
     int stalled = 0;
@@ -117,7 +119,7 @@ DenseStatus LevelSolver::iterate(int samples) {
 }
 
 void LevelSolver::refine_with_many_samples() {
-    const LastSteps& last = view_.images().chosen.empty() ? kLastStepsOfAllPixels : kLastStepsOfChosenPixels;
+    const LastSteps& last = images().chosen.empty() ? kLastStepsOfAllPixels : kLastStepsOfChosenPixels;
     const int samples = last.samples * settings_.spp;
     settings_.spp *= last.first_samples;
     stride_ = 1;
@@ -125,6 +127,7 @@ void LevelSolver::refine_with_many_samples() {
     ++e_.renders;
     for (int k = 0; k < kLastStepsMax; ++k) {
         differentiate(last.jacobian_valid_px, o_.fineness);
+        measure_noise();
         if (!linearise()) return;
         Step step = next_step(kDampingMin);
         if (settings_.spp == samples && (step.sigmas < last.sigmas || step.motion_px < last.px)) {
@@ -142,7 +145,7 @@ void LevelSolver::refine_with_many_samples() {
 
 /// Pixels that are not chosen keep their samples, with the signal predicted after this step.
 void LevelSolver::choose(const Vector6& step) {
-    std::vector<std::uint8_t> pixels = informative_pixels(view_.images(), e_.exposure, kChosenInformation);
+    std::vector<std::uint8_t> pixels = informative_pixels(images(), e_.exposure, kChosenInformation);
     view_.predict(step);
     view_.choose(std::move(pixels));
     choosing_ = false;
@@ -156,7 +159,7 @@ std::optional<Vector6> LevelSolver::distance_after_steps_to(const Rigid3& T_came
     const Vector6 way = error_between(e_.T_camera_body, T_camera_body);
     if (!(distance_px(way) < kSameMinimum_px)) return {};
     Vector6 left = way;
-    const bool of_few_pixels = !view_.images().chosen.empty();
+    const bool of_few_pixels = !images().chosen.empty();
     for (int k = 0; k < kSameMinimumSteps; ++k) {
         if (k > 0)
             settings_.spp *= (of_few_pixels ? kLastStepsOfChosenPixels : kLastStepsOfAllPixels).first_samples;
@@ -180,21 +183,77 @@ void LevelSolver::evaluate_loss() {
     render(e_.T_camera_body);
     ++e_.renders;
     e_.window = view_.window();
-    e_.excess_loss = cost(view_.images(), e_.exposure, {}).excess();
+    e_.excess_loss = cost(images(), e_.exposure, {}).excess();
 }
 
 void LevelSolver::linearise_with_many_samples() {
     view_.choose_all();
-    settings_.spp *= kLastStepsOfAllPixels.samples;
+    settings_.spp = kLastStepsOfAllPixels.samples * std::max(2, o_.samples_per_pixel);
     render(e_.T_camera_body);
     differentiate(kJacobianValid_px, std::max(1, o_.fineness / kLinesDivisor));
+    measure_noise();
     linearise();
-    loss_when_linearised_ = cost(view_.images(), e_.exposure, {}).robust;
+    loss_when_linearised_ = cost(images(), e_.exposure, {}).robust;
+}
+
+PhotometricImages LevelSolver::images() const {
+    PhotometricImages out = view_.images();
+    out.sampling_factor = e_.sampling_factor;
+    return out;
+}
+
+void LevelSolver::measure_noise() {
+    const PhotometricImages now = images();
+    if (now.measured_variance.empty())
+        e_.sampling_factor = sampling_factor(now, e_.exposure, 1 + settings_.spp / kFewestSamplesOfFrame);
+}
+
+std::vector<Suspicion> LevelSolver::suspicions() {
+    const PhotometricImages now = images();
+    const FrameSettings few = settings_of_suspects();
+    return narpa::suspicions({view_, now, e_.T_camera_body, few, o_.model}, e_.exposure, robust_);
+}
+
+FrameSettings LevelSolver::settings_of_suspects() const {
+    FrameSettings few = settings_;
+    few.spp = std::max(2, o_.samples_per_pixel);
+    return few;
+}
+
+void LevelSolver::solve(const Suspicion& s) {
+    const PhotometricImages now = images();
+    const FrameSettings few = settings_of_suspects();
+    const NuisanceColumns columns = s.suspect->columns({view_, now, e_.T_camera_body, few, o_.model});
+    std::vector<float> light(now.signal.size());
+    for (std::size_t i = 0; i < columns.size(); ++i)
+        for (std::size_t p = 0; p < light.size(); ++p)
+            light[p] += static_cast<float>(s.fit.amounts[i]) * columns[i][p];
+    view_.add_light(light);
+    e_.T_camera_body = displaced(e_.T_camera_body, s.fit.pose_step);
+    e_.exposure.gain = std::max(e_.exposure.gain + s.fit.exposure_step.gain, kGainMin);
+    e_.exposure.offset_dn += s.fit.exposure_step.offset_dn;
+}
+
+Vector6 LevelSolver::remaining_step() const {
+    return ldlt_solve(equations_.pose_information(), equations_.pose_gradient());
+}
+
+void LevelSolver::step_along_observed(const Observability& o) {
+    constexpr int kSteps = 2;
+    view_.choose_all();
+    for (int k = 0; k < kSteps; ++k) {
+        render(e_.T_camera_body);
+        ++e_.renders;
+        differentiate(kJacobianValid_px, std::max(1, o_.fineness / kLinesDivisor));
+        if (!linearise()) return;
+        const Vector6 step = observed_step(o, equations_.pose_information(), equations_.pose_gradient());
+        e_.T_camera_body = displaced(e_.T_camera_body, step);
+    }
 }
 
 void LevelSolver::shift() {
     const int most = std::min({kShiftMax_px, view_.window().width / 4, view_.window().height / 4});
-    const auto [dx, dy] = best_shift(view_.images(), most);
+    const auto [dx, dy] = best_shift(images(), most);
     if (dx == 0 && dy == 0) return;
     Vector6 sideways = Vector6::Zero();
     const double z = std::abs(e_.T_camera_body.t.z);
@@ -219,10 +278,10 @@ void LevelSolver::differentiate(double reach_px, int fineness) {
 
 /// False where the pose is not observable.
 bool LevelSolver::linearise() {
-    const PhotometricImages images = view_.images();
-    robust_.scale = residual_scale(images, e_.exposure, robust_.model_dn2);
-    cost_ = cost(images, e_.exposure, robust_);
-    equations_ = equations(images, e_.exposure, robust_, false);
+    const PhotometricImages now = images();
+    robust_.scale = residual_scale(now, e_.exposure, robust_.model_dn2);
+    cost_ = cost(now, e_.exposure, robust_);
+    equations_ = equations(now, e_.exposure, robust_, false);
     return cost_.pixels >= kPixelsMin && equations_.observes_pose();
 }
 
@@ -263,7 +322,7 @@ bool LevelSolver::try_step(const Step& step) {
     if (!is_pose(there) || !window_about(render_scene_.tracer(), camera_, target_, there)) return false;
     render(there);
     ++e_.renders;
-    const PhotometricCost now = cost(view_.images(), after(step), robust_);
+    const PhotometricCost now = cost(images(), after(step), robust_);
     const bool better = step.trusted || now.robust <= cost_.robust * (1 + kCostSlack);
     if (better) {
         take(step);

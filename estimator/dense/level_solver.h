@@ -6,6 +6,7 @@
 
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/dense/level_view.h"
+#include "estimator/dense/model_suspects.h"
 
 namespace narpa {
 
@@ -39,12 +40,22 @@ public:
     [[nodiscard]] std::optional<Vector6> distance_after_steps_to(const Rigid3& T_camera_body);
     /// Renders with as many samples as the last step and linearises at the estimate's pose.
     void linearise_with_many_samples();
+    /// After linearise_with_many_samples(): tests for errors of the model (model_suspects.h).
+    [[nodiscard]] std::vector<Suspicion> suspicions();
+    /// Adds a light that a test found to the prediction, and takes the step that goes with it.
+    void solve(const Suspicion& s);
+    /// RMS residual over that expected from noise (DenseEstimate::residual).
+    [[nodiscard]] double residual() const;
+    /// After linearise_with_many_samples(): the step that is left.
+    [[nodiscard]] Vector6 remaining_step() const;
+    /// A few steps from the estimate's pose, none along the unobserved motions.
+    void step_along_observed(const Observability& o);
     struct Rise {
         double min, max;
     };
     /// After linearise_with_many_samples(): smallest and largest rise of the loss along the `motions` least
     /// observed motions, at this many standard deviations to both sides, over that of a linear image. About one if
-    /// the image is linear so far.
+    /// the image is linear so far. Motions that count as unobserved are left out.
     [[nodiscard]] Rise rise(int motions, double sigmas);
     /// The bound of DenseAlignment::bound, at the estimate.
     Result<Matrix6> bound();
@@ -58,6 +69,12 @@ private:
         bool trusted = false;  ///< so small that noise decides whether the cost decreases
     };
 
+    /// Images with which suspects' columns are made: few samples are enough for differences.
+    [[nodiscard]] FrameSettings settings_of_suspects() const;
+    /// Of the view, with the sampling noise's size as estimated.
+    [[nodiscard]] PhotometricImages images() const;
+    /// Estimates that size if the frame's own noise is not known.
+    void measure_noise();
     void shift();
     DenseStatus iterate(int samples);
     void choose(const Vector6& step);

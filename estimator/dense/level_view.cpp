@@ -10,6 +10,7 @@
 
 #include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/integrator/shading.h"
 
 namespace narpa {
 namespace {
@@ -91,6 +92,7 @@ LevelView::LevelView(const RenderScene& render_scene, const Camera& camera, cons
       window_(window),
       target_(target),
       at_(at),
+      render_scene_(render_scene),
       view_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at),
       derivative_(render_scene, windowed(camera, window.x, window.y, window.width, window.height), target, at) {
     const std::size_t n = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
@@ -103,6 +105,7 @@ void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, c
                             const ModelUncertainty& model, const std::optional<Rigid3>& T_world_camera) {
     differentiated_at_.reset();
     chosen_.clear();
+    added_.clear();
     at_ = at, motion_ = motion, times_ = times.from(window_.y), model_ = model, T_world_camera_ = T_world_camera;
     view_.begin_frame(at_, motion_, times_);
     derivative_.begin_frame(at_, motion_, times_);
@@ -139,9 +142,16 @@ void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
     const double per_mean_band = k[0] + k[1] + k[2];
     for (std::size_t i = 0; i < signal_.size(); ++i) {
         if (!is_chosen(i)) continue;
-        signal_[i] = static_cast<float>(sensor_.signal(view_.radiance().pixels[i]));
+        signal_[i] =
+            static_cast<float>(sensor_.signal(view_.radiance().pixels[i])) + (added_.empty() ? 0 : added_[i]);
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
+}
+
+void LevelView::add_light(std::span<const float> signal) {
+    assert(signal.size() == signal_.size());
+    added_.resize(signal_.size());
+    for (std::size_t i = 0; i < signal.size(); ++i) added_[i] += signal[i], signal_[i] += signal[i];
 }
 
 void LevelView::allow_for_missed_light(int samples) {
@@ -187,6 +197,78 @@ std::vector<float> LevelView::change_with_light(const Rigid3& T_camera_target, c
                                       : 0);
     view_.begin_frame(at_, motion_, times_);
     return change;
+}
+
+std::vector<float> LevelView::rendered() const {
+    std::vector<float> out;
+    out.reserve(signal_.size());
+    for (const Rgb& radiance : view_.radiance().pixels) out.push_back(static_cast<float>(sensor_.signal(radiance)));
+    return out;
+}
+
+std::vector<std::vector<float>> LevelView::changes_with_light(const Rigid3& T_camera_target,
+                                                              const FrameSettings& settings) {
+    const auto& sun = render_scene_.scene().sun;
+    if (!sun) return {};
+    constexpr double kTurn_rad = 3 * std::numbers::pi / 180;
+    view_.render_with_variance(T_camera_target, settings);
+    const std::vector<float> unturned = rendered();
+    const Vec3 to_sun = conjugate(at_.T_world_body[target_].q) * normalized(sun->direction);
+    const Vec3 across = normalized(cross(to_sun, std::abs(to_sun.z) < 0.5 ? Vec3{0, 0, 1} : Vec3{1, 0, 0}));
+    std::vector<std::vector<float>> changes;
+    for (const Vec3& axis : {across, cross(to_sun, across)}) {
+        BodyPoses turned = at_;
+        turned.T_world_body[target_].q = normalized(at_.T_world_body[target_].q * exp_rotation(kTurn_rad * axis));
+        view_.begin_frame(turned, motion_, times_);
+        view_.render_with_variance(T_camera_target, settings);
+        changes.push_back(rendered());
+        for (std::size_t p = 0; p < unturned.size(); ++p)
+            changes.back()[p] = (changes.back()[p] - unturned[p]) / static_cast<float>(kTurn_rad);
+    }
+    view_.begin_frame(at_, motion_, times_);
+    return changes;
+}
+
+std::vector<float> LevelView::ambient_light() const {
+    constexpr int kAcross = 2;  // rays across a pixel
+    std::vector<float> out(signal_.size());
+    HitBatch hits;
+    std::array<ImagePoint, kLanes> points;
+    for (int y = 0; y < window_.height; ++y)
+        for (int first = 0; first < window_.width * kAcross * kAcross; first += static_cast<int>(kLanes)) {
+            const int n = std::min(static_cast<int>(kLanes), window_.width * kAcross * kAcross - first);
+            for (int i = 0; i < n; ++i) {
+                const int ray = (first + i) % (kAcross * kAcross);
+                points[static_cast<std::size_t>(i)] = {
+                    (first + i) / (kAcross * kAcross) + (ray % kAcross + 0.5) / kAcross - 0.5,
+                    y + (ray / kAcross + 0.5) / kAcross - 0.5};
+            }
+            view_.trace_pixels(std::span(points).first(static_cast<std::size_t>(n)), hits);
+            for (int i = 0; i < n; ++i) {
+                const Hit hit = hits[static_cast<std::size_t>(i)];
+                if (hit.body != static_cast<int>(target_)) continue;
+                const Vec3 along = normalized(hit.position - view_.T_world_camera().t);
+                const double width_m = hit.range_m / view_.camera().model->pixels_per_radian();
+                const Surface surface = surface_at(view_.tracer(), view_.placement(), hit, along, width_m);
+                out[static_cast<std::size_t>(y * window_.width + (first + i) / (kAcross * kAcross))] +=
+                    static_cast<float>(sensor_.signal(ambient_reflectance(surface)));
+            }
+        }
+    const float most = out.empty() ? 0 : *std::ranges::max_element(out);
+    if (most > 0)
+        for (float& v : out) v /= most;
+    return out;
+}
+
+std::vector<float> LevelView::indirect_light(const Rigid3& T_camera_target, FrameSettings settings) {
+    settings.mechanisms.separate_sun = false;
+    view_.render_with_variance(T_camera_target, settings);
+    const std::vector<float> direct = rendered();
+    settings.method = RenderSettings::Method::path;
+    view_.render_with_variance(T_camera_target, settings);
+    std::vector<float> indirect = rendered();
+    for (std::size_t p = 0; p < direct.size(); ++p) indirect[p] -= direct[p];
+    return indirect;
 }
 
 void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness) {

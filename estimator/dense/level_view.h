@@ -35,6 +35,7 @@ public:
               double pixels_averaged, const Window& window, std::size_t target, const BodyPoses& at);
 
     [[nodiscard]] const Window& window() const noexcept { return window_; }
+    [[nodiscard]] const RowTimes& row_times() const noexcept { return times_; }
     /// Like ModelView::begin_frame; `times`: of the rows of `camera`. `model`: its uncertainty of brightness and
     /// light increases the pixels' expected variance. `T_world_camera`: DenseOptions.
     void begin_frame(const BodyPoses& at, const ApparentMotion& motion, const RowTimes& times,
@@ -47,6 +48,8 @@ public:
     /// unreliable: stratified samples measure the bright area to about half a sample, so that all may miss it. This
     /// overstates the variance beside edges.
     void allow_for_missed_light(int samples);
+    /// Adds light to this frame's latest and later renders, DN.
+    void add_light(std::span<const float> signal);
     /// Updates the latest render's signal for a small step of the pose, by the Jacobian.
     void predict(const Vector6& step);
     /// From now on `render` and `differentiate` process only the pixels whose mask is not 0. The others keep their
@@ -57,6 +60,15 @@ public:
     /// target axes, and seen at the same pose.
     [[nodiscard]] std::vector<float> change_with_light(const Rigid3& T_camera_target, const FrameSettings& settings,
                                                        const Vec3& turn_rad);
+    /// The same for turns by one degree about two axes across the light, by renders with these settings; empty
+    /// without a Sun.
+    [[nodiscard]] std::vector<std::vector<float>> changes_with_light(const Rigid3& T_camera_target,
+                                                                     const FrameSettings& settings);
+    /// DN of the target in light that falls on all of its surfaces alike; the brightest is 1. At the latest
+    /// render's pose.
+    [[nodiscard]] std::vector<float> ambient_light() const;
+    /// DN of the light that the target's surfaces reflect to each other, by renders with these settings.
+    [[nodiscard]] std::vector<float> indirect_light(const Rigid3& T_camera_target, FrameSettings settings);
     /// At the pose of the latest render, for lit pixels.
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
     /// Pose and fineness of this frame's latest Jacobian.
@@ -72,6 +84,8 @@ private:
     [[nodiscard]] bool is_chosen(std::size_t pixel) const { return chosen_.empty() || chosen_[pixel] != 0; }
     void place(const Rigid3& T_camera_target);
     [[nodiscard]] std::vector<std::uint8_t> lit() const;
+    /// DN above black of view_'s latest image.
+    [[nodiscard]] std::vector<float> rendered() const;
     void add_shading(const Rigid3& T_camera_target, const FrameSettings& settings);
 
     const SensorModel& sensor_;
@@ -83,9 +97,11 @@ private:
     RowTimes times_{};
     ModelUncertainty model_{};
     std::optional<Rigid3> T_world_camera_;
+    const RenderScene& render_scene_;
     ModelView view_;
     ImageDerivative derivative_;
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
+    std::vector<float> added_;  ///< add_light; empty: none
     std::vector<std::uint8_t> measured_clipped_;
     std::vector<PixelDerivative> columns_;
     std::vector<std::uint8_t> chosen_;  ///< empty: all

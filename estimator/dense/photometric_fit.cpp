@@ -1,7 +1,6 @@
 #include "estimator/dense/photometric_fit.h"
 
 #include <tbb/parallel_for.h>
-#include <cassert>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <numeric>
 #include <vector>
 
+#include "estimator/dense/photometric_residuals.h"
 #include "estimator/least_squares/median.h"
 #include "estimator/least_squares/symmetric.h"
 
@@ -20,81 +20,11 @@ namespace {
 /// Precision of an exact prior.
 constexpr double kExactPriorPrecision = 1e12;
 
+/// Of residuals so large that Cauchy's loss is concave at most of them, the second derivative is no information.
+constexpr double kLeastCurvature = 0.3;
+
 double precision(double sigma) {
     return sigma > 0 ? 1 / (sigma * sigma) : kExactPriorPrecision;
-}
-
-struct Residual {
-    double r = 0;          ///< in units of s
-    double inverse_s = 0;  ///< 1 / DN
-    bool counts = false, shows_target = false;
-};
-
-class Residuals {
-public:
-    Residuals(const PhotometricImages& images, const Exposure& exposure, double model_dn2)
-        : i_(images), e_(exposure), model_dn2_(model_dn2) {
-        [[maybe_unused]] const std::size_t pixels = images.signal.size();
-        assert(pixels == static_cast<std::size_t>(images.width) * static_cast<std::size_t>(images.height));
-        assert(images.measured.empty() || images.measured.size() == pixels);
-        assert(images.derivative.empty() || images.derivative.size() == pixels);
-    }
-
-    [[nodiscard]] Residual at(int x, int y) const {
-        const auto p =
-            static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x);
-        const auto at_p = [p](std::span<const float> v) { return v.empty() ? 0.0 : static_cast<double>(v[p]); };
-        const double signal = at_p(i_.signal);
-        const double expected = i_.sensor.black_dn + e_.gain * signal + e_.offset_dn;
-        const double measured = i_.measured.empty() ? std::min(expected, i_.sensor.top_dn) : at_p(i_.measured);
-        const bool clipped = i_.measured.empty() ? expected >= i_.sensor.top_dn
-                                                 : !i_.measured_clipped.empty() && i_.measured_clipped[p] != 0;
-        Residual out;
-        if (clipped && expected >= measured) return out;
-        const double variance = i_.sensor.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
-                                model_dn2_ + e_.gain * e_.gain * at_p(i_.signal_variance) +
-                                i_.model_part * i_.model_part * signal * signal;
-        out.counts = variance > 0;
-        if (!out.counts) return out;
-        out.inverse_s = 1 / std::sqrt(variance);
-        out.r = (measured - expected) * out.inverse_s;
-        out.shows_target = signal > 0 || (!i_.derivative.empty() && !i_.derivative[p].isZero(0));
-        return out;
-    }
-    [[nodiscard]] const Exposure& exposure() const noexcept { return e_; }
-    /// The outermost pixels have no Jacobian.
-    template <class Do>
-    void each(int y, Do&& act) const {
-        for (int x = 1; x < i_.width - 1; ++x)
-            if (const Residual r = at(x, y); r.counts)
-                act(r,
-                    static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x));
-    }
-
-private:
-    const PhotometricImages& i_;
-    const Exposure& e_;
-    const double model_dn2_;
-};
-
-/// Row by row, so that sums do not depend on the number of threads.
-template <class Sum, class Add>
-Sum sum_rows(const PhotometricImages& images, Add&& add) {
-    std::vector<Sum> rows(static_cast<std::size_t>(std::max(images.height, 0)));
-    tbb::parallel_for(1, std::max(images.height - 1, 1), [&](int y) { add(y, rows[static_cast<std::size_t>(y)]); });
-    Sum sum;
-    for (const Sum& row : rows) sum += row;
-    return sum;
-}
-
-using Matrix8 = Eigen::Matrix<double, 8, 8>;
-using Vector8 = Eigen::Matrix<double, 8, 1>;
-
-/// Derivative of a pixel's expected DN by pose, gain and offset.
-Vector8 design(const PhotometricImages& images, const Exposure& exposure, std::size_t p) {
-    Vector8 J;
-    J << exposure.gain * images.derivative[p].cast<double>(), static_cast<double>(images.signal[p]), 1;
-    return J;
 }
 
 /// Adds weight J J' to the lower triangle; J is 0 before `first`.
@@ -115,7 +45,7 @@ Matrix8 scatter_of_blocks(const PhotometricImages& images, const Residuals& resi
         const int first = static_cast<int>(row) * kBlock_px;
         for (int y = std::max(1, first); y < std::min(first + kBlock_px, images.height - 1); ++y)
             residuals.each(y, [&](const Residual& r, std::size_t p) {
-                const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
+                const double weight = cauchy_weight(r.r, k);
                 const std::size_t x = p % static_cast<std::size_t>(images.width);
                 pulls[x / kBlock_px] += weight * r.r * r.inverse_s * design(images, residuals.exposure(), p);
             });
@@ -201,28 +131,59 @@ PhotometricCost cost(const PhotometricImages& images, const Exposure& exposure, 
     return sum;
 }
 
+namespace {
+
+/// Residuals are smaller than the noise by the part of it that the fit follows: the pixel's leverage (HC2 of J. G.
+/// MacKinnon, H. White, J. Econometrics 29, 1985).
+void add_scatter(const PhotometricImages& images, const Residuals& residuals, double k, PhotometricEquations& out) {
+    constexpr double kMostLeverage = 0.9;
+    struct Sum {
+        Matrix8 scatter = Matrix8::Zero();
+        double curvature = 0, leverage = 0;
+        Sum& operator+=(const Sum& b) {
+            scatter += b.scatter, curvature += b.curvature, leverage += b.leverage;
+            return *this;
+        }
+    };
+    const Matrix8 inverse = out.information.inverse();
+    const Sum sum = sum_rows<Sum>(images, [&](int y, Sum& row) {
+        residuals.each(y, [&](const Residual& r, std::size_t p) {
+            const double weight = cauchy_weight(r.r, k);
+            const Vector8 J = r.inverse_s * design(images, residuals.exposure(), p);
+            const bool moves = !images.derivative[p].isZero(0);
+            const double leverage = moves ? weight * J.dot(inverse * J) : 0;
+            add_square(row.scatter, J, weight * weight * r.r * r.r / (1 - std::min(leverage, kMostLeverage)),
+                       moves ? 0 : 6);
+            row.leverage += leverage, row.curvature += (2 * weight - 1) * leverage;
+        });
+    });
+    out.scatter = Matrix8(sum.scatter.selfadjointView<Eigen::Lower>());
+    out.block_scatter = scatter_of_blocks(images, residuals, k);
+    if (sum.leverage > 0) out.curvature = std::max(sum.curvature / sum.leverage, kLeastCurvature);
+}
+
+}  // namespace
+
 PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure, const Robustness& robust,
                                bool scatter) {
     const Residuals residuals(images, exposure, robust.model_dn2);
     const double k = robust.cauchy * robust.scale;
     auto out = sum_rows<PhotometricEquations>(images, [&](int y, PhotometricEquations& row) {
         residuals.each(y, [&](const Residual& r, std::size_t p) {
-            const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
+            const double weight = cauchy_weight(r.r, k);
             const Vector8 J = r.inverse_s * design(images, exposure, p);
             const int first = images.derivative[p].isZero(0) ? 6 : 0;  // first column that is not 0
             add_square(row.information, J, weight, first);
-            if (scatter) add_square(row.scatter, J, weight * weight * r.r * r.r, first);
             row.gradient += weight * r.r * J;
         });
     });
-    if (scatter) out.block_scatter = scatter_of_blocks(images, residuals, k);
     out.information = Matrix8(out.information.selfadjointView<Eigen::Lower>());
-    out.scatter = Matrix8(out.scatter.selfadjointView<Eigen::Lower>());
     // The prior in the units of residuals that are `scale` times their noise.
     const double unit = robust.scale * robust.scale;
     const Eigen::Vector2d prior =
         unit * Eigen::Vector2d(precision(images.prior.gain_sigma), precision(images.prior.offset_sigma_dn));
     out.information.diagonal().tail<2>() += prior;
+    if (scatter) add_scatter(images, residuals, k, out);
     out.scatter.diagonal().tail<2>() += prior;
     out.block_scatter.diagonal().tail<2>() += prior;
     out.gradient.tail<2>() -= prior.cwiseProduct(Eigen::Vector2d(exposure.gain - 1, exposure.offset_dn));
@@ -239,8 +200,10 @@ Matrix6 PhotometricEquations::pose_covariance() const {
     const Matrix8 inverse = information.inverse();
     const Matrix8& larger =
         (inverse * block_scatter).trace() > (inverse * scatter).trace() ? block_scatter : scatter;
-    const bool as_expected = (inverse * larger).trace() <= 8;
-    const Matrix6 C = (as_expected ? inverse : Matrix8(inverse * larger * inverse)).topLeftCorner<6, 6>();
+    const double per_information = 1 / (curvature * curvature);
+    const bool as_expected = per_information * (inverse * larger).trace() <= 8;
+    const Matrix6 C =
+        (as_expected ? inverse : Matrix8(per_information * inverse * larger * inverse)).topLeftCorner<6, 6>();
     return 0.5 * (C + C.transpose());  // removes asymmetry due to rounding
 }
 
@@ -266,7 +229,7 @@ Vector8 response(const PhotometricImages& images, const Exposure& exposure, cons
     return sum_rows<Sum>(images,
                          [&](int y, Sum& row) {
                              residuals.each(y, [&](const Residual& r, std::size_t p) {
-                                 const double weight = std::isfinite(k) ? 1 / (1 + r.r * r.r / (k * k)) : 1;
+                                 const double weight = cauchy_weight(r.r, k);
                                  const double e = exposure.gain * static_cast<double>(change[p]) * r.inverse_s;
                                  row.gradient += weight * e * r.inverse_s * design(images, exposure, p);
                              });
@@ -301,41 +264,6 @@ std::vector<std::uint8_t> informative_pixels(const PhotometricImages& of_samples
     std::vector<std::uint8_t> chosen(leverage.size());
     std::ranges::transform(leverage, chosen.begin(), [&](float l) { return l > 0 && l >= least ? 1 : 0; });
     return chosen;
-}
-
-double blur_score(const PhotometricImages& images, const Exposure& exposure, const PhotometricEquations& fit) {
-    struct Sum {
-        Vector8 shared = Vector8::Zero();
-        double score = 0, variance = 0;
-        Sum& operator+=(const Sum& b) {
-            shared += b.shared, score += b.score, variance += b.variance;
-            return *this;
-        }
-    };
-    const Residuals residuals(images, exposure, 0);
-    // A blur changes a pixel by its variance times half the Laplacian. The pixel's own sampling noise is in both
-    // the Laplacian and the residual, so it must be small.
-    const auto by_blur = [&](const Residual& r, std::size_t p) {
-        if (!images.chosen.empty() && images.chosen[p] == 0 && images.signal[p] != 0) return 0.0;
-        const auto& S = images.signal;
-        const auto width = static_cast<std::size_t>(images.width);
-        const auto around = static_cast<double>(S[p - 1] + S[p + 1] + S[p - width] + S[p + width]);
-        return r.inverse_s * exposure.gain * (around - 4 * static_cast<double>(S[p]));
-    };
-    const Vector8 shared = sum_rows<Sum>(images, [&](int y, Sum& row) {
-                               residuals.each(y, [&](const Residual& r, std::size_t p) {
-                                   row.shared += by_blur(r, p) * r.inverse_s * design(images, exposure, p);
-                               });
-                           }).shared;
-    const Vector8 taken = fit.information.inverse() * shared;  // part explained by pose and exposure
-    const Sum sum = sum_rows<Sum>(images, [&](int y, Sum& row) {
-        residuals.each(y, [&](const Residual& r, std::size_t p) {
-            const double term = (by_blur(r, p) - r.inverse_s * design(images, exposure, p).dot(taken)) * r.r;
-            row.score += term;
-            row.variance += term * term;
-        });
-    });
-    return sum.variance > 0 ? sum.score / std::sqrt(sum.variance) : 0;
 }
 
 Vector6 PhotometricEquations::pose_gradient() const {

@@ -43,6 +43,9 @@ struct PhotometricImages {
     /// Mask: not 0 for the pixels that determine the pose (informative_pixels). The others have no derivative and
     /// fewer samples; gain, offset and the residuals' scale use all. Empty: all.
     std::span<const std::uint8_t> chosen{};
+    /// Sampling variance of prediction and frame over `signal_variance`: 1 where the frame's is in
+    /// `measured_variance` (sampling_noise.h).
+    double sampling_factor = 1;
     double model_part = 0;  ///< standard deviation of the prediction's model error, as a part of the signal
 };
 
@@ -83,6 +86,9 @@ struct PhotometricEquations {
     /// blocks of pixels whose residuals share a model error.
     Eigen::Matrix<double, 8, 8> scatter = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 8> block_scatter = Eigen::Matrix<double, 8, 8>::Zero();
+    /// Mean second derivative of the loss over its weight, as the pixels determine the pose: the gradient changes
+    /// by this part of what `information` says, where weights fall as residuals rise. 1 for least squares.
+    double curvature = 1;
 
     PhotometricEquations& operator+=(const PhotometricEquations& b);
     /// Information of the pose with gain and offset marginalised.
@@ -92,7 +98,8 @@ struct PhotometricEquations {
     [[nodiscard]] Vector6 pose_gradient() const;
     /// Inverse information where residuals are no larger than their noise; else the sandwich estimator (P. J.
     /// Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 5th Berkeley Symposium,
-    /// 1967), of independent pixels or of blocks (K.-Y. Liang, S. Zeger, Biometrika 73, 1986), whichever is larger.
+    /// 1967), of independent pixels or of blocks (K.-Y. Liang, S. Zeger, Biometrika 73, 1986), whichever is larger,
+    /// over the square of the curvature.
     [[nodiscard]] Matrix6 pose_covariance() const;
     /// RMS residual over that expected from noise, weighted by the pixels' information about the pose.
     [[nodiscard]] double residual() const;
@@ -109,13 +116,6 @@ struct PhotometricEquations {
 /// and frame. Depends on the measured image only through its clipped pixels.
 [[nodiscard]] std::vector<std::uint8_t> informative_pixels(const PhotometricImages& images,
                                                            const Exposure& exposure, double part);
-/// Standard deviations by which the residuals show a blur that the prediction lacks (negative: excess blur of the
-/// prediction): score test of the blur's variance at zero (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948), with
-/// pose, gain and offset unknown. The score's variance is the sum of its squared terms, so that an error of the
-/// assumed noise level has no effect. `fit`: the equations there, of least squares at the noise (Robustness{1, inf,
-/// 0}).
-[[nodiscard]] double blur_score(const PhotometricImages& images, const Exposure& exposure,
-                                const PhotometricEquations& fit);
 /// Gradient that results if the measured image changes by `change`, DN of predicted signal per pixel.
 [[nodiscard]] Eigen::Matrix<double, 8, 1> response(const PhotometricImages& images, const Exposure& exposure,
                                                    const Robustness& robust, std::span<const float> change);

@@ -11,6 +11,8 @@
 #include "estimator/least_squares/median.h"
 #include "estimator/least_squares/symmetric.h"
 #include "estimator/uncertainty/response.h"
+#include "estimator/uncertainty/unobserved.h"
+#include "estimator/uncertainty/untold.h"
 
 namespace narpa {
 namespace {
@@ -261,6 +263,15 @@ void FeatureAlignment::compare_with_mirrored(const MeasuredImage& frame, const B
     e.covariance += 0.5 * apart * apart.transpose();
 }
 
+void FeatureAlignment::keep_guess_where_unobserved(const Rigid3& guess, FeatureEstimate& e, Fit& fit) {
+    const Observability o = fit.observability;
+    e.T_camera_target =
+        with_guess_where_unobserved(e.matches, *view_.camera().model, o, e.T_camera_target, guess, e.floor_px);
+    e.covariance = e.covariance_of_model +
+                   with_guess(o, e.covariance - e.covariance_of_model, GuessError{}, norm(e.T_camera_target.t));
+    observe(e.T_camera_target, e.covariance, fit);
+}
+
 FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                         const ApparentMotion& motion) {
     FeatureEstimate e = estimate(frame, at, guess, motion);
@@ -275,9 +286,17 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
         compare_with_mirrored(frame, at, guess, motion, e, fit);
     e.covariance_of_model =
         covariance_by(joined(image_shifts(settings_.model, e.T_camera_target, motion, e.by_focal), e.by_light));
+    // With a rolling shutter that is told, matches of renders over time have errors of their own that grow with the
+    // row.
+    if (fit.failed.empty() && e.has_pose() && times_.row_s == 0 &&
+        refuses(e.rows.sigmas, e.rows.shift, e.covariance))
+        fit.failed = why_untold(kProgressiveRows, e.rows.sigmas, e.rows.shift, e.covariance);
     e.covariance += e.covariance_of_model, e.bound += e.covariance_of_model;
-    if (e.has_pose())
-        observe(e.T_camera_target, e.covariance, fit), compare_with_guess(e.T_camera_target, guess, fit);
+    if (e.has_pose()) {
+        observe(e.T_camera_target, e.covariance, fit);
+        if (fit.failed.empty() && fit.observability.unobserved > 0) keep_guess_where_unobserved(guess, e, fit);
+        compare_with_guess(e.T_camera_target, guess, fit);
+    }
     e.answer = judge(std::move(fit));
     return e;
 }
@@ -364,6 +383,8 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
+    estimate.rows = progressive_rows(points, camera, estimate.T_camera_target, floor_px);
+    estimate.matches = points;
     if (estimate.agreeing < kManyMatches)
         estimate.covariance = covariance_by_response(
             estimate.covariance,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/features/feature_matcher.h"
+#include "estimator/features/match_suspects.h"
 #include "estimator/features/model_matches.h"
 #include "estimator/pnp/pnp_refine.h"
 #include "estimator/uncertainty/answer.h"
@@ -58,6 +59,8 @@ struct FeatureEstimate {
     std::vector<FeatureRound> rounds;    ///< from the guess
     Vector6 by_focal = Vector6::Zero();  ///< shift of the pose (pnp_refine.h)
     PoseShifts by_light{6, 0};           ///< by the light's direction, turned about each of the target's axes
+    MatchSuspicion rows{};               ///< progressive_rows
+    ModelMatches matches{};              ///< of the last view, those that agree
     Answer answer;
 
     [[nodiscard]] bool has_pose() const noexcept {
@@ -98,6 +101,7 @@ private:
                                              const BodyPoses& at, const ApparentMotion& motion, double floor_px);
     void compare_with_mirrored(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                const ApparentMotion& motion, FeatureEstimate& e, Fit& fit);
+    void keep_guess_where_unobserved(const Rigid3& guess, FeatureEstimate& e, Fit& fit);
     [[nodiscard]] bool on_smooth_surface(const HitBatch& hits) const;
 
     ModelView view_;

@@ -28,11 +28,15 @@ double distance_px(const Pixel& a, const Pixel& b) {
 }
 
 /// Part of a window's side that overlaps with another window at this distance.
-double overlap(double distance) {
+double overlap_of_sides(double distance) {
     return std::max(0.0, 1 - std::abs(distance) / (2 * kFlowHalfWindow_px + 1));
 }
 
 }  // namespace
+
+double overlap(const Pixel& a, const Pixel& b) {
+    return overlap_of_sides(a.u - b.u) * overlap_of_sides(a.v - b.v);
+}
 
 double root_mean_square(const std::vector<double>& lengths) {
     const Eigen::Map<const Eigen::VectorXd> all(lengths.data(), static_cast<Eigen::Index>(lengths.size()));
@@ -100,7 +104,7 @@ ModelMatches::Sums ModelMatches::sums(const CameraModel& camera, const Rigid3& T
     for (std::size_t i = 0; i < size(); ++i) {
         out.information += whitened[i] * whitened[i].transpose();
         for (std::size_t j = 0; j < i; ++j) {
-            const double part = overlap(pixels[i].u - pixels[j].u) * overlap(pixels[i].v - pixels[j].v);
+            const double part = overlap(pixels[i], pixels[j]);
             if (part <= 0) continue;
             const Matrix6 pair = part * whitened[i] * whitened[j].transpose();
             out.shared += pair + pair.transpose();

@@ -49,6 +49,8 @@ struct ModelMatches {
     [[nodiscard]] double floor_px(const CameraModel& camera, const Rigid3& T, double freedom) const;
 };
 
+/// Part of the windows about two pixels that both have, which share the errors of this part.
+[[nodiscard]] double overlap(const Pixel& a, const Pixel& b);
 [[nodiscard]] double root_mean_square(const std::vector<double>& lengths);
 /// Standard deviation of residuals in u and in v, from the median of their lengths.
 [[nodiscard]] double scale_of(std::vector<double> lengths);

@@ -1,4 +1,5 @@
-// The score of a blur: of noise it is a standard normal number; a blur raises it. Which pixels hold the pose.
+// What residuals say about a nuisance: of noise a standard normal number; a blur raises it. The size of sampling
+// noise. Which pixels hold the pose.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -8,7 +9,9 @@
 #include <random>
 #include <vector>
 
+#include "estimator/dense/nuisance_fit.h"
 #include "estimator/dense/photometric_fit.h"
+#include "estimator/dense/sampling_noise.h"
 
 namespace narpa {
 namespace {
@@ -50,8 +53,8 @@ struct Disc {
                 .derivative = derivative};
     }
     /// Of a frame with this blur, after a fit.
-    double score(double blur_px, std::mt19937_64& random) {
-        std::normal_distribution<double> normal(0, 5);
+    double score(double blur_px, std::mt19937_64& random, double noise_dn = 5) {
+        std::normal_distribution<double> normal(0, noise_dn);
         measured.clear();
         for (int y = 0; y < kSide; ++y)
             for (int x = 0; x < kSide; ++x)
@@ -62,10 +65,16 @@ struct Disc {
         for (std::size_t p = 0; p < signal.size(); ++p)
             signal[p] += static_cast<float>(derivative[p].cast<double>().dot(step.head<6>()));
         const Exposure exposure{1 + step[6], step[7]};
-        const PhotometricEquations fit = equations(images(), exposure, {1, kAll, 0});
-        const double found = blur_score(images(), exposure, fit);
+        const double found = fit_nuisance(images(), exposure, {1, kAll, 0}, {laplacian()}, 0).sigmas;
         signal = unmoved;
         return found;
+    }
+    /// Change of the disc by a blur.
+    [[nodiscard]] std::vector<float> laplacian() const {
+        std::vector<float> out(signal.size());
+        for (std::size_t p = kSide; p + kSide < out.size(); ++p)
+            out[p] = signal[p - 1] + signal[p + 1] + signal[p - kSide] + signal[p + kSide] - 4 * signal[p];
+        return out;
     }
 };
 
@@ -102,24 +111,62 @@ TEST(InformativePixels, AreTheFewestWithThatPartOfTheInformation) {
     }
 }
 
-TEST(BlurScore, OfNoiseIsAStandardNormalNumber) {
+/// Whatever the noise's size: the sensor's is 5 DN.
+TEST(NuisanceFit, OfNoiseIsAStandardNormalNumber) {
     Disc disc;
     std::mt19937_64 random(5);
     constexpr int kFrames = 300;
-    double sum = 0, squares = 0;
-    for (int i = 0; i < kFrames; ++i) {
-        const double c = disc.score(0.4, random);
-        sum += c, squares += c * c;
-        EXPECT_LT(std::abs(c), 4) << i;
+    for (const double noise_dn : {5.0, 15.0}) {
+        double sum = 0, squares = 0;
+        for (int i = 0; i < kFrames; ++i) {
+            const double c = disc.score(0.4, random, noise_dn);
+            sum += c, squares += c * c;
+            EXPECT_LT(std::abs(c), 4) << i;
+        }
+        EXPECT_NEAR(sum / kFrames, 0, 0.2);
+        EXPECT_NEAR(squares / kFrames, 1, 0.25);
     }
-    EXPECT_NEAR(sum / kFrames, 0, 0.2);
-    EXPECT_NEAR(squares / kFrames, 1, 0.25);
 }
 
-TEST(BlurScore, ShowsABlurThatTheModelDoesNotHave) {
+TEST(NuisanceFit, ShowsABlurThatTheModelDoesNotHave) {
     Disc disc;
     std::mt19937_64 random(6);
     for (int i = 0; i < 20; ++i) EXPECT_GT(disc.score(1.2, random), 4) << i;
+}
+
+/// What a motion explains is no nuisance of its own, and one that a prior limits widens the pose by it.
+TEST(NuisanceFit, OfAMotionHasNoUnknowns) {
+    Disc disc;
+    std::mt19937_64 random(7);
+    (void)disc.score(0.4, random);
+    std::vector<float> motion;
+    for (const PixelDerivative& J : disc.derivative) motion.push_back(2 * J[0]);
+    const NuisanceFit fit = fit_nuisance(disc.images(), {}, {1, kAll, 0}, {motion}, 0.1);
+    EXPECT_EQ(fit.unknowns, 0);
+    EXPECT_NEAR(std::sqrt(fit.covariance(0, 0)), 0.2, 1e-3);
+    EXPECT_NEAR(fit.covariance(1, 1), 0, 1e-6);
+}
+
+/// Noise of the render and of a frame with a third of its samples: four times the render's variance.
+TEST(SamplingFactor, IsThatOfTheResiduals) {
+    Disc disc;
+    std::mt19937_64 random(8);
+    (void)disc.score(0.4, random);
+    std::vector<float> variance;
+    for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x) {
+            const double off = std::abs(std::hypot(x - 19.3, y - 19.8) - 12);
+            variance.push_back(off < 1 ? 100.0F : 0.0F);
+        }
+    for (std::size_t p = 0; p < variance.size(); ++p)
+        disc.measured[p] = disc.signal[p] + static_cast<float>(std::normal_distribution<double>(
+                                                0, std::sqrt(25 + 4 * static_cast<double>(variance[p])))(random));
+    PhotometricImages images = disc.images();
+    images.signal_variance = variance;
+    EXPECT_NEAR(sampling_factor(images, {}, 50), 4, 1.2);
+    EXPECT_DOUBLE_EQ(sampling_factor(images, {}, 2), 2);
+    disc.measured = disc.signal;
+    EXPECT_DOUBLE_EQ(sampling_factor(images, {}, 50), kLeastSamplingFactor);
 }
 
 }  // namespace

@@ -364,10 +364,15 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         if (k == settings_.renders_max - 1) estimate.covariance += step * step.transpose();
     }
     estimate.floor_px = floor_px;
-    if (estimate.agreeing < kManyMatches)
+    estimate.points = points.observations();
+    if (estimate.agreeing < kManyMatches) {
+        const Matrix6 before = estimate.covariance;
         estimate.covariance = covariance_by_response(
             estimate.covariance,
             response(points, scale, render_settings, T_of_view, estimate.covariance, floor_px));
+        estimate.points.inflation =
+            std::max(1.0, ldlt_solve(before, estimate.covariance).trace() / static_cast<double>(before.rows()));
+    }
     if (settings_.model.light_rad > 0)
         estimate.by_light = shifts_by_light(points, scale, render_settings, T_of_view, at, motion, floor_px);
     const std::vector<PixelCovariance> as_weighed = points.covariances(floor_px), of_noise = points.covariances(0);

@@ -12,6 +12,7 @@
 #include "estimator/features/feature_matcher.h"
 #include "estimator/features/model_matches.h"
 #include "estimator/pnp/pnp_refine.h"
+#include "estimator/pnp/point_observations.h"
 #include "estimator/uncertainty/answer.h"
 #include "estimator/uncertainty/model_uncertainty.h"
 #include "estimator/view/model_view.h"
@@ -59,6 +60,7 @@ struct FeatureEstimate {
     Vector6 by_focal = Vector6::Zero();  ///< shift of the pose (pnp_refine.h)
     PoseShifts by_light{6, 0};           ///< by the light's direction, turned about each of the target's axes
     Answer answer;
+    PointObservations points;  ///< the matches that agree
 
     [[nodiscard]] bool has_pose() const noexcept {
         return status == FeatureStatus::settled || status == FeatureStatus::unsettled;

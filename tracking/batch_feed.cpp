@@ -104,6 +104,7 @@ void BatchSweepFeed::take(const ReplayedSweep& made, std::int64_t stamp_late_ns,
     LidarSweep sweep;
     for (const ReplayedSweep::Packet& p : made.packets) reader_.append(p.bytes, p.t_ns - made.t_ns, sweep);
     for (RangePoint& p : sweep.points) p.range_m += longer_m;
+    sweep.empty.clear();  // beside the target, they would pass through a model that is too large
     TrackedFrame f = tracker_->take(made.sweep, made.t_ns, made.t_end_ns, std::move(sweep));
     if (f.measured) {
         const std::int64_t stamp_ns = f.t_ns + stamp_late_ns;

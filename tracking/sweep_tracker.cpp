@@ -71,7 +71,7 @@ ApparentMotion SweepTracker::motion_about(std::int64_t t_ns, std::int64_t length
 
 double SweepTracker::search_radius_m(const TrackedFrame& out) const {
     const TrackerOptions& o = tracker_.options();
-    if (!tracker_.started()) return 0.01 * o.start_percent * norm(out.truth.t) + o.start_deg * kDegree * reach_m_;
+    if (!tracker_.predicts()) return 0.01 * o.start_percent * norm(out.truth.t) + o.start_deg * kDegree * reach_m_;
     const Matrix6 known = tracker_.filter().pose({}).covariance;  // its size is the same in all axes
     return narpa::search_radius_m(position_sigma(known), rotation_sigma(known), reach_m_);
 }

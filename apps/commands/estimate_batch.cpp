@@ -102,6 +102,7 @@ Result<BatchPlan> plan_of(const RunEstimate& run, const BatchSensors& sensors, c
     plan.options.path = *path;
     plan.options.motion.acceleration_psd = tracker.acceleration_psd;
     plan.options.motion.angular_acceleration_psd = tracker.angular_acceleration_psd;
+    plan.tracker.guesses_from_truth = true;
     plan.options.frame_variance = tracker.method->variance_between_frames;
     if (auto chosen = choose_sensors(sensors, plan); !chosen) return chosen.error();
     return plan;

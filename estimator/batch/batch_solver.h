@@ -86,7 +86,7 @@ struct BatchResidual {
     std::int64_t t_ns = 0;
     bool is_sweep = false;
     std::size_t points = 0;   ///< 0: not used
-    double rms_start = 0;     ///< of the residuals, px or m, with the model as it was given,
+    double rms_start = 0;     ///< of the residuals, px or m, at its own pose by the given model,
     double rms = 0;           ///< and at the solution
     double downweighted = 0;  ///< part of the points that are outliers
     double score = 0;         ///< squared length of the whitened score, as many numbers as

@@ -31,6 +31,8 @@ public:
     /// Until a frame has given a pose, guesses are the truth displaced as the options state, or each frame is
     /// searched. Runs on the calling thread's TBB arena.
     TrackedFrame take(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at);
+    /// Points that the pose of the last frame rests on; null: the method finds none.
+    [[nodiscard]] const PointObservations* points() const noexcept { return estimator_->points(); }
 
 private:
     FrameTracker(const World& world, std::size_t camera, std::size_t target, const TrackerOptions& options);

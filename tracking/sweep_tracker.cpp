@@ -1,6 +1,7 @@
 #include "tracking/sweep_tracker.h"
 
 #include <cmath>
+#include <utility>
 
 #include "base/time.h"
 #include "estimator/cloud/own_body.h"
@@ -29,23 +30,30 @@ std::int64_t centre_times(LidarSweep& sweep, std::int64_t otherwise) {
 
 }  // namespace
 
-SweepTracker::SweepTracker(const World& world, std::size_t lidar, std::size_t target, const TrackerOptions& options)
+SweepTracker::SweepTracker(const World& world, const World& model, std::size_t lidar, std::size_t target,
+                           const TrackerOptions& options)
     : world_(world),
-      lidar_(world.scene().lidars[lidar]),
+      model_(model),
+      lidar_(model.scene().lidars[lidar]),
       target_(target),
-      reach_m_(world.tracer().bounding_radius_m(static_cast<std::uint32_t>(target))),
+      reach_m_(model.tracer().bounding_radius_m(static_cast<std::uint32_t>(target))),
       tracker_(options),
-      settings_(icp_settings(world, lidar_, options)),
-      icp_(world.tracer(), target, settings_) {
-    if (options.search) search_.emplace(world.tracer(), target, settings_);
+      settings_(icp_settings(model, lidar_, options)),
+      icp_(model.tracer(), target, settings_) {
+    if (options.search) search_.emplace(model.tracer(), target, settings_);
 }
 
 Result<std::unique_ptr<SweepTracker>> SweepTracker::create(const World& world, std::size_t lidar,
                                                            const TrackerOptions& options) {
-    const Lidar& l = world.scene().lidars[lidar];
+    return create(world, world, lidar, options);
+}
+
+Result<std::unique_ptr<SweepTracker>> SweepTracker::create(const World& world, const World& model,
+                                                           std::size_t lidar, const TrackerOptions& options) {
+    const Lidar& l = model.scene().lidars[lidar];
     const auto target = target_of(world, l.mount, l.name, options.target);
     if (!target) return target.error();
-    return std::unique_ptr<SweepTracker>(new SweepTracker(world, lidar, *target, options));
+    return std::unique_ptr<SweepTracker>(new SweepTracker(world, model, lidar, *target, options));
 }
 
 Rigid3 SweepTracker::T_lidar_target_at(std::int64_t t_ns, Quat* q_frame_chaser) const {
@@ -56,23 +64,22 @@ Rigid3 SweepTracker::T_lidar_target_at(std::int64_t t_ns, Quat* q_frame_chaser) 
     return inverse(T_world_lidar) * bodies.T_world_body[target_];
 }
 
-ApparentMotion SweepTracker::motion(std::int64_t t_ns, std::int64_t length_ns) const {
+ApparentMotion SweepTracker::motion_about(std::int64_t t_ns, std::int64_t length_ns) const {
     return motion_between(T_lidar_target_at(t_ns - length_ns / 2), T_lidar_target_at(t_ns + length_ns / 2),
                           1e-9 * static_cast<double>(length_ns));
 }
 
 double SweepTracker::search_radius_m(const TrackedFrame& out) const {
     const TrackerOptions& o = tracker_.options();
-    if (!tracker_.started()) return 0.01 * o.start_percent * norm(out.truth.t) + o.start_deg * kDegree * reach_m_;
+    if (!tracker_.predicts()) return 0.01 * o.start_percent * norm(out.truth.t) + o.start_deg * kDegree * reach_m_;
     const Matrix6 known = tracker_.filter().pose({}).covariance;  // its size is the same in all axes
     return narpa::search_radius_m(position_sigma(known), rotation_sigma(known), reach_m_);
 }
 
-void SweepTracker::measure(const LidarSweep& sweep, const ApparentMotion& moving, const Quat& q_frame_chaser,
-                           TrackedFrame& out) {
+void SweepTracker::measure(const Quat& q_frame_chaser, TrackedFrame& out) {
     const auto e = search_ && !tracker_.started()
-                       ? search_->find(sweep.points, moving, sweep.empty)
-                       : icp_.align(sweep.points, moving, out.guess, search_radius_m(out), sweep.empty,
+                       ? search_->find(sweep_.points, motion_, sweep_.empty)
+                       : icp_.align(sweep_.points, motion_, out.guess, search_radius_m(out), sweep_.empty,
                                     tracker_.guess_covariance(T_chaser_lidar(), q_frame_chaser, out.guess));
     if (!e) {
         out.why = e.error().what;
@@ -85,16 +92,18 @@ void SweepTracker::measure(const LidarSweep& sweep, const ApparentMotion& moving
 
 TrackedFrame SweepTracker::take(std::int64_t number, std::int64_t begin_ns, std::int64_t end_ns, LidarSweep sweep) {
     const std::int64_t start_ns = monotonic_ns();
-    remove_own_body(world_.tracer(), lidar_, sweep);
+    sweep_ = std::move(sweep);
+    remove_own_body(model_.tracer(), lidar_, sweep_);
     TrackedFrame out;
     out.frame = static_cast<std::uint32_t>(number);
-    out.t_ns = begin_ns + centre_times(sweep, (end_ns - begin_ns) / 2);
+    out.t_ns = begin_ns + centre_times(sweep_, (end_ns - begin_ns) / 2);
     Quat q_frame_chaser;
     out.truth = T_lidar_target_at(out.t_ns, &q_frame_chaser);
     tracker_.predict(out.t_ns, q_frame_chaser);
     out.guess = tracker_.guess(T_chaser_lidar(), q_frame_chaser, out.truth);
     const bool searched = search_ && !tracker_.started();
-    measure(sweep, motion(out.t_ns, end_ns - begin_ns), q_frame_chaser, out);
+    motion_ = motion_about(out.t_ns, end_ns - begin_ns);
+    measure(q_frame_chaser, out);
     tracker_.update(T_chaser_lidar(), q_frame_chaser, !searched, out);
     out.ms = seconds_since(start_ns) * 1e3;
     return out;

@@ -95,13 +95,13 @@ void TargetTracker::predict(std::int64_t t_ns, const Quat& q_frame_chaser) {
 }
 
 Rigid3 TargetTracker::guess(const Rigid3& T_chaser_sensor, const Quat& q_frame_chaser, const Rigid3& truth) {
-    if (started()) return inverse(T_chaser_sensor) * filter().pose(q_frame_chaser).T_chaser_target;
+    if (predicts()) return inverse(T_chaser_sensor) * filter().pose(q_frame_chaser).T_chaser_target;
     return options_.guess ? *options_.guess : displaced_truth(truth, options_, random_);
 }
 
 Matrix6 TargetTracker::guess_covariance(const Rigid3& T_chaser_sensor, const Quat& q_frame_chaser,
                                         const Rigid3& guess) const {
-    if (!started()) return start_covariance(options_, norm(guess.t));
+    if (!predicts()) return start_covariance(options_, norm(guess.t));
     return covariance_in_other_axes(conjugate(T_chaser_sensor.q), filter().pose(q_frame_chaser).covariance) +
            covariance_of_model_;
 }

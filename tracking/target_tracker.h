@@ -24,6 +24,8 @@ struct TrackerOptions {
     std::string target;  ///< name of the body; empty: the first with a mesh that does not carry the camera
     const CameraMethod* method = &camera_methods().front();  ///< those that can start from where features lead
     double start_deg = 2, start_percent = 2;  ///< how far the first guess is off: attitude, and part of the range
+    /// Each frame and sweep starts from the truth displaced, not from the filter, which a wrong model misleads.
+    bool guesses_from_truth = false;
     bool search = false;       ///< without an initial pose, from a range known to 30 % (estimator/search)
     double range_guess_m = 0;  ///< for the search; 0: the truth, off by up to 30 %, or the guess
     /// T_camera_target of the first frame where there is no truth. The target's pose in `at` then only gives its
@@ -86,6 +88,8 @@ public:
     [[nodiscard]] std::mt19937_64& random() noexcept { return random_; }
     /// There is a pose to predict from.
     [[nodiscard]] bool started() const noexcept { return tracker_.started(); }
+    /// The next guess is the filter's prediction.
+    [[nodiscard]] bool predicts() const noexcept { return started() && !options_.guesses_from_truth; }
     /// Requires started().
     [[nodiscard]] const PoseFilter& filter() const noexcept { return tracker_.filter(); }
 

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "apps/cli.h"
+#include "apps/commands/estimate_batch.h"
 #include "apps/commands/estimate_run.h"
 #include "apps/commands/sweep_file.h"
 #include "apps/scene_argument.h"
@@ -32,6 +33,8 @@ struct EstimateOptions {
     std::vector<std::string> sets;  ///< of the scene
     TrackerFlags tracker;
     RunEstimate run;  ///< of a logged run; its sensor and threads hold for a file too
+    BatchSensors sensors;
+    BatchFlags batch;
 
     // Of a single file. Scene, trajectory and --pose give the truth, or with `no_truth` the initial guess. Without
     // `no_truth`, the guess is the truth displaced.
@@ -41,7 +44,7 @@ struct EstimateOptions {
     bool no_truth = false;  ///< the poses are a guess
     PoseOptions pose;
 
-    std::vector<Option> only_of_files, only_of_logs, only_of_frames, only_of_sweeps;
+    std::vector<Option> only_of_files, only_of_logs, only_of_frames, only_of_sweeps, only_of_batches;
 };
 
 // --- One frame or one sweep in a file ---------------------------------------------------------------------------
@@ -257,6 +260,15 @@ Outcome estimate(EstimateOptions o) {
             return Error{fmt::format("{} goes with {}", option.name(),
                                      of_log ? "a scene file, and this is a folder" : "the folder of a logged run"),
                          o.input};
+    for (const Option& option : o.only_of_batches)
+        if (option.given() && !o.batch.on) return Error{fmt::format("{} goes with --batch", option.name())};
+    if (of_log && o.batch.on) {
+        o.run.folder = o.input;
+        return estimate_batch(o.run, o.sensors, o.batch, *tracker);
+    }
+    if (!o.sensors.camera.empty() && !o.sensors.lidar.empty())
+        return Error{"--camera and --lidar: expected one of them, or --batch too, for both at once"};
+    o.run.sensor = o.sensors.camera + o.sensors.lidar;
     if (of_log) {
         for (const Option& option : o.only_of_frames)
             if (option.given()) o.run.of_frames.push_back(option.name());
@@ -294,8 +306,9 @@ Command add_estimate(Parser app) {
         .required();
     SceneArgument::add_set_to(c, o->sets);
     add_strict_to(c);
-    c.option("--camera,--lidar", o->run.sensor, "Name of the camera or LiDAR (default: the first of the scene)")
+    c.option("--camera", o->sensors.camera, "Name of the camera (default: the first of the scene)")
         .type_name("NAME");
+    c.option("--lidar", o->sensors.lidar, "Name of the LiDAR, whose sweeps are estimated").type_name("NAME");
     c.option(
          "--frame", o->frame,
          "A frame, also of a real camera: FILE.png, .tif or .pgm in the camera's size and format, or the bytes in "
@@ -320,6 +333,7 @@ Command add_estimate(Parser app) {
     o->pose.add_to(c);
     c.option("--scene", o->run.scene, "Scene file (default: the run's)").type_name("SCENE");
     o->tracker.add_to(c, "");
+    o->batch.add_to(c);
     c.option("--every", o->run.every, "Use every N-th frame or sweep").range(1, 1000000);
     c.option("--threads", o->run.threads, "Threads (default: all cores)").range(0, 1024);
     c.option("--csv", o->run.csv, "A row for each frame or sweep").type_name("FILE.csv");
@@ -329,10 +343,14 @@ Command add_estimate(Parser app) {
         o->only_of_files.push_back(c.find(name));
     for (const char* name : {"--method", "--frame-noise"}) o->only_of_frames.push_back(c.find(name));
     for (const char* name : {"--unit", "--range-noise"}) o->only_of_sweeps.push_back(c.find(name));
-    for (const char* name : {"--scene", "--every", "--csv", "--output"}) o->only_of_logs.push_back(c.find(name));
+    for (const char* name : {"--scene", "--every", "--csv", "--output", "--batch"})
+        o->only_of_logs.push_back(c.find(name));
+    for (const char* name : {"--unknowns", "--path-sigma", "--model-error"})
+        o->only_of_batches.push_back(c.find(name));
     c.footer("Exit status 1 if no frame or sweep gave a pose, or that of a single one is ambiguous or refused.");
     c.group("Results");
     c.examples({"narpa estimate out/first-flight -o out/errors.png", "narpa estimate out/first-flight --lidar top",
+                "narpa estimate out/first-flight --batch --every 10 -o out/batch.png",
                 "narpa estimate docking --frame out/frame.raw",
                 "narpa estimate asteroid.toml --frame image.png --no-truth --uncertainty scale=0.01,light_deg=1"});
     return [o] { return estimate(*o); };

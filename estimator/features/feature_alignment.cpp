@@ -24,6 +24,9 @@ constexpr double kNeighbour_px = 1.5;
 /// off its tangent plane by at most this many pixels' worth of depth: a bend is a corner, a step is an outline.
 constexpr double kStep_px = 6;
 
+/// Progressive rows that move the pose by up to eight standard deviations enlarge its covariance by the shift;
+/// others refuse it. Photographs of a chessboard by a webcam are moved by two to seven.
+constexpr double kWidenedShift_chi2 = 64;
 /// With fewer degrees of freedom the residuals do not determine their scatter.
 constexpr double kFewestFreedom = 3;
 /// Steps with a smaller squared Mahalanobis length are noise, as each view selects other features.
@@ -289,8 +292,12 @@ FeatureEstimate FeatureAlignment::align(const MeasuredImage& frame, const BodyPo
     // With a rolling shutter that is told, matches of renders over time have errors of their own that grow with the
     // row.
     if (fit.failed.empty() && e.has_pose() && times_.row_s == 0 &&
-        refuses(e.rows.sigmas, e.rows.shift, e.covariance))
-        fit.failed = why_untold(kProgressiveRows, e.rows.sigmas, e.rows.shift, e.covariance);
+        refuses(e.rows.sigmas, e.rows.shift, e.covariance)) {
+        if (normalised_error_squared(e.rows.shift, e.covariance) > kWidenedShift_chi2)
+            fit.failed = why_untold(kProgressiveRows, e.rows.sigmas, e.rows.shift, e.covariance);
+        else
+            e.covariance += e.rows.shift * e.rows.shift.transpose();
+    }
     e.covariance += e.covariance_of_model, e.bound += e.covariance_of_model;
     if (e.has_pose()) {
         observe(e.T_camera_target, e.covariance, fit);
@@ -385,10 +392,15 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     estimate.floor_px = floor_px;
     estimate.rows = progressive_rows(points, camera, estimate.T_camera_target, floor_px);
     estimate.matches = points;
-    if (estimate.agreeing < kManyMatches)
+    estimate.points = points.observations();
+    if (estimate.agreeing < kManyMatches) {
+        const Matrix6 before = estimate.covariance;
         estimate.covariance = covariance_by_response(
             estimate.covariance,
             response(points, scale, render_settings, T_of_view, estimate.covariance, floor_px));
+        estimate.points.inflation =
+            std::max(1.0, ldlt_solve(before, estimate.covariance).trace() / static_cast<double>(before.rows()));
+    }
     if (settings_.model.light_rad > 0)
         estimate.by_light = shifts_by_light(points, scale, render_settings, T_of_view, at, motion, floor_px);
     const std::vector<PixelCovariance> as_weighed = points.covariances(floor_px), of_noise = points.covariances(0);

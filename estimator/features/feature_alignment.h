@@ -13,6 +13,7 @@
 #include "estimator/features/match_suspects.h"
 #include "estimator/features/model_matches.h"
 #include "estimator/pnp/pnp_refine.h"
+#include "estimator/pnp/point_observations.h"
 #include "estimator/uncertainty/answer.h"
 #include "estimator/uncertainty/model_uncertainty.h"
 #include "estimator/view/model_view.h"
@@ -62,6 +63,7 @@ struct FeatureEstimate {
     MatchSuspicion rows{};               ///< progressive_rows
     ModelMatches matches{};              ///< of the last view, those that agree
     Answer answer;
+    PointObservations points{};  ///< `matches`, as a batch takes them
 
     [[nodiscard]] bool has_pose() const noexcept {
         return status == FeatureStatus::settled || status == FeatureStatus::unsettled;

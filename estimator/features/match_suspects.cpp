@@ -1,6 +1,7 @@
 #include "estimator/features/match_suspects.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -40,6 +41,28 @@ std::vector<Whitened> whitened(const ModelMatches& m, const CameraModel& camera,
     return out;
 }
 
+/// The combinations of motions with the row of which the pose leaves at least this part of the square: of matches
+/// on a plane it explains some nearly.
+constexpr double kLeastOfRowsLeft = 0.02;
+
+using Combinations = Eigen::Matrix<double, kRowUnknowns, Eigen::Dynamic, 0, kRowUnknowns, kRowUnknowns>;
+
+/// Columns: the pose's six unknowns, then these combinations.
+Combinations determined(const MatrixOfRows& information) {
+    const Matrix6 of_pose = information.topLeftCorner<6, 6>(), mixed = information.topRightCorner<6, 6>(),
+                  own = information.bottomRightCorner<6, 6>();
+    Vector6 unit = own.diagonal();  // in which the image of each unknown has a square of one
+    for (double& u : unit) u = u > 0 ? 1 / std::sqrt(u) : 0;
+    const Eigen::MatrixXd left =
+        unit.asDiagonal() * (own - mixed.transpose() * of_pose.ldlt().solve(mixed)) * unit.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(left);
+    const auto kept = (eigen.eigenvalues().array() > kLeastOfRowsLeft).count();
+    Combinations out = Combinations::Zero(kRowUnknowns, 6 + kept);
+    out.topLeftCorner<6, 6>().setIdentity();
+    out.bottomRightCorner(6, kept) = unit.asDiagonal() * eigen.eigenvectors().rightCols(kept);
+    return out;
+}
+
 }  // namespace
 
 MatchSuspicion progressive_rows(const ModelMatches& m, const CameraModel& camera, const Rigid3& T,
@@ -58,19 +81,24 @@ MatchSuspicion progressive_rows(const ModelMatches& m, const CameraModel& camera
             shared += pair + pair.transpose();
         }
     }
-    const Eigen::LDLT<MatrixOfRows> solver(information);
-    const MotionOfRows step = solver.solve(gradient);
-    const MatrixOfRows inverse = solver.solve(MatrixOfRows::Identity());
+    const Combinations to = determined(information);
+    const Eigen::Index rows = to.cols() - 6;
+    if (rows == 0) return {};
+    const Eigen::MatrixXd reduced = to.transpose() * information * to;
+    const Eigen::MatrixXd inverse = reduced.ldlt().solve(Eigen::MatrixXd::Identity(to.cols(), to.cols()));
+    const Eigen::MatrixXd of_shared = inverse * (to.transpose() * shared * to);
+    const Eigen::VectorXd step = inverse * (to.transpose() * gradient);
     // As matches share errors, the unknowns absorb more of the scatter than their number.
-    const double freedom = 2 * static_cast<double>(all.size()) - kRowUnknowns - (inverse * shared).trace();
-    if (!(freedom > kRowUnknowns)) return {};
+    const auto unknowns = static_cast<double>(to.cols());
+    const double freedom = 2 * static_cast<double>(all.size()) - unknowns - of_shared.trace();
+    if (!(freedom > unknowns)) return {};
     double chi2 = 0;
-    for (const Whitened& w : all) chi2 += (w.residual - w.design * step).squaredNorm();
-    const MatrixOfRows covariance = chi2 / freedom * (inverse + inverse * shared * inverse);
-    const Vector6 amount = step.tail<6>();
-    const Matrix6 of_amount = covariance.bottomRightCorner<6, 6>();
+    for (const Whitened& w : all) chi2 += (w.residual - w.design * (to * step)).squaredNorm();
+    const Eigen::MatrixXd covariance = chi2 / freedom * (inverse + of_shared * inverse);
+    const Eigen::VectorXd amount = step.tail(rows);
+    const Eigen::MatrixXd of_amount = covariance.bottomRightCorner(rows, rows);
     MatchSuspicion out;
-    out.sigmas = as_normal(amount.dot(of_amount.ldlt().solve(amount)), 6);
+    out.sigmas = as_normal(amount.dot(of_amount.ldlt().solve(amount)), static_cast<double>(rows));
     const Matrix6 of_pose = information.topLeftCorner<6, 6>();
     const Vector6 without = of_pose.ldlt().solve(gradient.head<6>());
     out.shift = step.head<6>() - without;

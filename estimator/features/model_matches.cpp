@@ -69,6 +69,15 @@ std::vector<PixelCovariance> ModelMatches::covariances(double floor_px) const {
     return all;
 }
 
+PointObservations ModelMatches::observations() const {
+    PointObservations out;
+    out.body_m = body_m, out.seen = pixels, out.noise = covariances(0);
+    out.beyond.assign(size(), {1, 0, 1});
+    out.window_px = 2 * kFlowHalfWindow_px + 1;
+    out.numbers.assign(size(), 2);
+    return out;
+}
+
 std::vector<Matrix26> ModelMatches::jacobians(const CameraModel& camera, const Rigid3& T) const {
     std::vector<Matrix26> all;
     all.reserve(size());

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "estimator/pnp/pnp_points.h"
+#include "estimator/pnp/point_observations.h"
 #include "estimator/pose/pose_estimate.h"
 #include "renderer/projection/camera_model.h"
 
@@ -25,6 +25,9 @@ struct ModelMatches {
     /// Covariance of a match, if all scatter by `floor_px` beyond the sensor's noise.
     [[nodiscard]] Eigen::Matrix2d match_covariance(std::size_t i, double floor_px) const;
     [[nodiscard]] std::vector<PixelCovariance> covariances(double floor_px) const;
+
+    /// With the scatter in px^2.
+    [[nodiscard]] PointObservations observations() const;
 
     [[nodiscard]] std::vector<Matrix26> jacobians(const CameraModel& camera, const Rigid3& T) const;
     [[nodiscard]] std::vector<double> residuals_px(const CameraModel& camera, const Rigid3& T) const;

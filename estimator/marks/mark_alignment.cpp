@@ -200,6 +200,7 @@ void MarkAlignment::state(const MarkFit& fitted, const ApparentMotion& motion, M
     e.covariance = fitted.covariance();
     e.marks = static_cast<int>(fitted.marks().marks().size());
     e.scatter = fitted.scatter();
+    e.points = fitted.observations();
     weigh_second(s, e, fit);
     const Vector6 by_focal = shift_by_focal(fitted.input(fitted.covariances()), e.T_camera_target);
     e.covariance_of_model = covariance_by(image_shifts(model_, e.T_camera_target, motion, by_focal));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/marks/mark_points.h"
+#include "estimator/pnp/point_observations.h"
 #include "estimator/uncertainty/answer.h"
 #include "estimator/uncertainty/model_uncertainty.h"
 #include "estimator/view/row_times.h"
@@ -30,6 +31,7 @@ struct MarkEstimate {
     int marks = 0;       ///< that the pose uses
     double scatter = 0;  ///< MarkFit::scatter
     Answer answer;
+    PointObservations points;  ///< of the marks that the pose uses
 };
 
 /// The marks of one body in the frames of one camera.

@@ -64,6 +64,18 @@ Matrix6 MarkFit::covariance() const {
     return solution_.fit.covariance + moved * moved.transpose();
 }
 
+PointObservations MarkFit::observations() const {
+    PointObservations out;
+    out.body_m = body_m_, out.seen = seen_;
+    const double common = kInCommon * kSampledAtCentres * marks_.undersampled();
+    for (const MarkPoint& p : marks_.points()) {
+        out.noise.push_back(p.noise), out.beyond.push_back(p.beyond), out.numbers.push_back(p.numbers);
+        out.common_px.push_back(p.numbers == 2 ? std::sqrt(common * p.beyond.uu) : 0);
+    }
+    out.scatter_min = kSampledAtCentres * marks_.undersampled();
+    return out;
+}
+
 PnpInput MarkFit::input(std::span<const PixelCovariance> covariances) const {
     return {camera_.get(), body_m_, seen_, 1, covariances};
 }

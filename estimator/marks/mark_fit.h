@@ -7,6 +7,7 @@
 
 #include "estimator/marks/mark_points.h"
 #include "estimator/pnp/pnp.h"
+#include "estimator/pnp/point_observations.h"
 #include "estimator/view/row_times.h"
 
 namespace narpa {
@@ -30,6 +31,7 @@ public:
 
     /// Of the solution's pose: by noise and scatter, and by a shift that all discs have in common.
     [[nodiscard]] Matrix6 covariance() const;
+    [[nodiscard]] PointObservations observations() const;
     /// The points as the solver saw them. The input refers to the fit.
     [[nodiscard]] PnpInput input(std::span<const PixelCovariance> covariances) const;
     [[nodiscard]] std::span<const PixelCovariance> covariances() const noexcept { return covariances_; }

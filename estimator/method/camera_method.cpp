@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "estimator/dense/dense_alignment.h"
 #include "estimator/features/feature_alignment.h"
@@ -19,12 +20,14 @@ public:
         : alignment_(render_scene, camera, target, BodyPoses(render_scene.scene().bodies.size()), settings(s)) {}
 
     Result<FramePose> estimate(const FrameInput& f) override {
-        const FeatureEstimate e = alignment_.align(f.image, f.at, f.guess, f.motion);
+        FeatureEstimate e = alignment_.align(f.image, f.at, f.guess, f.motion);
         bound_ = e.bound;
+        points_ = std::move(e.points);
         return FramePose{e.T_camera_target, e.covariance, e.covariance_of_model,
                          e.answer,          e.agreeing,   static_cast<int>(e.rounds.size())};
     }
     Result<Matrix6> bound(const FrameInput&, const Rigid3&) override { return bound_; }
+    const PointObservations* points() const noexcept override { return &points_; }
     void set_detector(const Detector& detector) override { alignment_.set_detector(detector); }
 
 private:
@@ -37,6 +40,7 @@ private:
 
     FeatureAlignment alignment_;
     Matrix6 bound_ = Matrix6::Zero();
+    PointObservations points_;
 };
 
 class DenseEstimator final : public FrameEstimator {
@@ -96,16 +100,19 @@ public:
         : alignment_(render_scene, camera, target, s.model) {}
 
     Result<FramePose> estimate(const FrameInput& f) override {
-        const MarkEstimate e = alignment_.align(f.image, f.guess, f.motion);
+        MarkEstimate e = alignment_.align(f.image, f.guess, f.motion);
         bound_ = e.bound;
+        points_ = std::move(e.points);
         return FramePose{e.T_camera_target, e.covariance, e.covariance_of_model, e.answer, e.marks, 0};
     }
     Result<Matrix6> bound(const FrameInput&, const Rigid3&) override { return bound_; }
+    const PointObservations* points() const noexcept override { return &points_; }
     void set_detector(const Detector& detector) override { alignment_.set_detector(detector); }
 
 private:
     MarkAlignment alignment_;
     Matrix6 bound_ = Matrix6::Zero();
+    PointObservations points_;
 };
 
 template <class Estimator>
@@ -126,6 +133,7 @@ constexpr std::array<CameraMethod, 3> kMethods{
     {{.name = "features",
       .measures = "points",
       .help = "points of the frame and of a render",
+      .finds_points = true,
       .light_is_that_of_the_guess = true,
       // Consecutive frames show the same details in nearly the same pixels: their errors correlate by 0.2 to 0.3
       // from one second to the next between 18 and 3 m.
@@ -139,10 +147,19 @@ constexpr std::array<CameraMethod, 3> kMethods{
      {.name = "marks",
       .measures = "marks",
       .help = "lamps, reflectors and tags that the scene states for the target",
+      .finds_points = true,
       // In frames sampled at the centres of pixels, marks at the same places between them have the same errors.
       .variance_between_frames = 2,
       .needs = needs_marks,
       .make = make<MarkEstimator>}}};
+
+/// Names of the methods that can do this, separated by " or ".
+std::string names_of_methods(bool CameraMethod::*can) {
+    std::string all;
+    for (const CameraMethod& m : kMethods)
+        if (m.*can) all += (all.empty() ? "" : " or ") + std::string(m.name);
+    return all;
+}
 
 }  // namespace
 
@@ -167,10 +184,11 @@ std::string help_of_camera_methods() {
 }
 
 std::string camera_methods_that_take_noise() {
-    std::string all;
-    for (const CameraMethod& m : kMethods)
-        if (m.takes_frame_noise) all += (all.empty() ? "" : " or ") + std::string(m.name);
-    return all;
+    return names_of_methods(&CameraMethod::takes_frame_noise);
+}
+
+std::string camera_methods_that_find_points() {
+    return names_of_methods(&CameraMethod::finds_points);
 }
 
 }  // namespace narpa

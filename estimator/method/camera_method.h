@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "estimator/pnp/point_observations.h"
 #include "estimator/uncertainty/answer.h"
 #include "estimator/uncertainty/model_uncertainty.h"
 #include "estimator/view/measured_image.h"
@@ -61,6 +62,8 @@ public:
     /// Cramer-Rao bound of the measurements that the method takes from a frame, at this pose; of the frame
     /// estimated last, where the method's measurements depend on the frame.
     [[nodiscard]] virtual Result<Matrix6> bound(const FrameInput& frame, const Rigid3& T_camera_target) = 0;
+    /// Points that the pose of the frame estimated last rests on; null: the method finds no points.
+    [[nodiscard]] virtual const PointObservations* points() const noexcept { return nullptr; }
     /// Exposure and gain of the frames from now on.
     virtual void set_detector(const Detector& detector) = 0;
 };
@@ -71,6 +74,7 @@ struct CameraMethod {
     std::string_view help;
     /// Compares pixels, so that the frame's noise decides whether the model fits (FrameInput::variance).
     bool takes_frame_noise = false;
+    bool finds_points = false;  ///< FrameEstimator::points, for estimates of many frames at once
     /// Renders with the light that the guess's attitude implies, not with that of the pose it finds.
     bool light_is_that_of_the_guess = false;
     /// Factor on the variance of an error for filters, which take errors of consecutive frames as independent.
@@ -92,5 +96,7 @@ struct CameraMethod {
 [[nodiscard]] std::string help_of_camera_methods();
 /// Names of the methods that take the frame's noise, separated by " or ".
 [[nodiscard]] std::string camera_methods_that_take_noise();
+/// The same of those that find points.
+[[nodiscard]] std::string camera_methods_that_find_points();
 
 }  // namespace narpa

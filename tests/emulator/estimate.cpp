@@ -117,18 +117,24 @@ TEST_F(EstimateTest, KnowsTheShutterAndTheLens) {
     const auto knows = FrameTracker::create(**world, 0, {}), ignores = FrameTracker::create(**ignorant, 0, {});
     ASSERT_TRUE(knows && ignores);
     double found = 0;
-    int named = 0;
+    int without_shutter = 0;
     for (std::uint32_t k = 0; k < 4; ++k) {
         const FrameLedger ledger = unit.expose(k, unit.t_mid_ns(k));
         const TrackedFrame a = (*knows)->take(ledger, unit.bytes(), unit.placement());
         const TrackedFrame b = (*ignores)->take(ledger, unit.bytes(), unit.placement());
         ASSERT_TRUE(a.measured) << a.why;
         found += error_between(*a.measured, a.truth).head<3>().squaredNorm();
-        EXPECT_FALSE(b.answer.usable()) << k;
-        if (b.why.find("a rolling shutter") != std::string::npos) ++named;
+        // Without the shutter: refused by its name, or with a covariance that includes what the rows show.
+        if (b.measured)
+            EXPECT_LT(normalised_error_squared(error_between(*b.measured, b.truth), b.covariance), 50) << k;
+        else if (b.why.find("a rolling shutter") != std::string::npos)
+            ++without_shutter;
+        if (b.measured && error_between(*b.measured, b.truth).head<3>().norm() >
+                              2 * error_between(*a.measured, a.truth).head<3>().norm())
+            ++without_shutter;
     }
     EXPECT_LT(found, 4 * 1e-7);
-    EXPECT_GE(named, 3) << "without the shutter, frames are refused by its name";
+    EXPECT_GE(without_shutter, 3);
 }
 
 /// Frames are taken with the exposure and gain that their ledgers have; parts of the image give no pose.

@@ -72,6 +72,15 @@ def estimates():
     return {"frames": frames}
 
 
+def batch():
+    states = [{"t_s": 0.5 * k, "rotation_error_rad": 1e-3 * random.lognormal(-1), "position_error_m": 0.01 * random.lognormal(-1),
+               "rotation_sigma_rad": 1e-3, "position_sigma_m": 0.01} for k in range(40)]  # fmt: skip
+    residuals = [{"t_s": 0.5 * k, "sweep": k % 2 == 1, "start": 0.3, "end": 0.1} for k in range(40)]
+    unknowns = [{"name": name, "change": 0.8, "sigma": 0.1 if known else 0.95, "prior_sigma": 1, "truth": 0.9, "determined": known}
+                for name, known in (("focal", True), ("scale", False), ("clock_s", True))]  # fmt: skip
+    return {"states": states, "residuals": residuals, "unknowns": unknowns}
+
+
 def approach():
     def run(method):
         ranges = np.geomspace(100, 1.2, 60)
@@ -161,7 +170,7 @@ def surface_map(interval=1.0):
             "lines": [{"level_m": 10.0, "closed": True, "px": circle, "position_m": [[0, 0, 0]] * 40}] if interval == 1 else []}  # fmt: skip
 
 
-DOCUMENTS = {"convergence": convergence, "ladder": ladder, "loop": loop, "estimates": estimates, "approach": approach,
+DOCUMENTS = {"convergence": convergence, "ladder": ladder, "loop": loop, "estimates": estimates, "batch": batch, "approach": approach,
              "approach_frames": approach_frames, "stereo": stereo, "icp": icp, "filter": filter_, "estimators": estimators,
              "replay": replay, "rehearsal": rehearsal, "campaign": campaign, "map": surface_map, "comparison": comparison}  # fmt: skip
 

@@ -27,6 +27,40 @@ def estimates(document):
     return drawn
 
 
+def batch(document):
+    """Errors of the trajectory, residuals before and after, and errors of the model with their priors."""
+    drawn = figure(11, 12, document["title"])
+    *errors, residuals, unknowns = drawn.subplots(4, 1, gridspec_kw={"height_ratios": [2, 2, 2, 3]})
+    t = column(document["states"], "t_s")
+    for axes, (quantity, unit, name, scale) in zip(errors, QUANTITIES):
+        values = lambda key: positive(scale * column(document["states"], f"{quantity}_{key}_{unit}"))
+        axes.plot(t, 3 * values("sigma"), color=SKY, linewidth=2, label="3 sigma")
+        axes.plot(t, values("error"), "o-", color=BLUE, markersize=3, linewidth=1, label="error")
+        logarithmic(axes, "y")
+        axes.set_ylabel(name)
+        axes.legend(ncol=2, loc="lower left", bbox_to_anchor=(0, 1))
+    for of_sweeps, colour, name in ((False, BLUE, "frames, px"), (True, VERMILION, "sweeps, m")):
+        rows = [r for r in document["residuals"] if r["sweep"] == of_sweeps]
+        if not rows:
+            continue
+        residuals.plot(column(rows, "t_s"), positive(column(rows, "start")), ":", color=colour, label=f"{name}, about its own pose, given model")
+        residuals.plot(column(rows, "t_s"), positive(column(rows, "end")), color=colour, label=f"{name}, solution")
+    logarithmic(residuals, "y")
+    residuals.set_ylabel("RMS residual")
+    residuals.set_xlabel("simulation time, s")
+    residuals.legend(ncol=4, loc="lower left", bbox_to_anchor=(0, 1))
+    rows = document["unknowns"]
+    unknowns.axhspan(-1, 1, color=GREEN, alpha=0.15, label="prior")
+    for i, row in enumerate(rows):
+        colour = BLUE if row["determined"] else GREY
+        prior = row["prior_sigma"]
+        unknowns.errorbar(i, row["change"] / prior, 3 * row["sigma"] / prior, fmt="o", color=colour, markersize=4)
+        unknowns.plot(i, row["truth"] / prior, "_", color=VERMILION, markersize=14)
+    unknowns.set_xticks(range(len(rows)), [row["name"] for row in rows], rotation=40, ha="right", fontsize=8)
+    unknowns.set_ylabel("change, prior sigmas (bars: 3 sigma;\nred: truth; grey: not determined)")
+    return drawn
+
+
 def approach(document):
     """Errors and bounds over range, and the convergence basin: share of poses found over the error of the start."""
     drawn = figure(9.5, 10.5, document["title"])
@@ -210,5 +244,5 @@ def label_points(axes, points):
                       color=colour, fontsize=7.5, arrowprops=arrow)  # fmt: skip
 
 
-KINDS = {"estimates": estimates, "approach": approach, "approach_frames": approach_frames, "stereo": stereo, "icp": icp,
+KINDS = {"estimates": estimates, "batch": batch, "approach": approach, "approach_frames": approach_frames, "stereo": stereo, "icp": icp,
          "filter": filter_nees, "estimators": estimators, "comparison": comparison}  # fmt: skip

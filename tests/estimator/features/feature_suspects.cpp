@@ -38,6 +38,27 @@ TEST(MatchSuspects, OfNoiseAreQuiet) {
         EXPECT_LT(progressive_rows(matches(0, random), kCameraOfMatches, kPoseOfMatches, 0.1).sigmas, 4) << i;
 }
 
+/// On a plane the pose nearly explains some motions with the row; these must not count.
+TEST(MatchSuspects, OfNoiseOnAPlaneAreQuiet) {
+    std::mt19937_64 random(6);
+    std::uniform_real_distribution<double> u(-1, 1);
+    std::normal_distribution<double> noise(0, 0.1);
+    for (int trial = 0; trial < 50; ++trial) {
+        ModelMatches m;
+        for (int i = 0; i < 60; ++i) {
+            const Vec3 p{u(random), u(random), 0};
+            const auto image = kCameraOfMatches.project(kPoseOfMatches * p);
+            m.body_m.push_back(p);
+            m.in_view.push_back({image->x, image->y});
+            m.pixels.push_back({image->x + noise(random), image->y + noise(random)});
+            m.noise.push_back(1e-4 * Eigen::Matrix2d::Identity());
+        }
+        const MatchSuspicion found = progressive_rows(m, kCameraOfMatches, kPoseOfMatches, 0.1);
+        EXPECT_LT(found.sigmas, 4) << trial;
+        EXPECT_LT(found.shift.tail<3>().norm(), 0.5) << trial << ": the pose's own sigma is about 0.05 m";
+    }
+}
+
 TEST(MatchSuspects, ShowRowsThatAreShifted) {
     std::mt19937_64 random(5);
     for (int i = 0; i < 10; ++i) {

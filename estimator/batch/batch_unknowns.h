@@ -1,0 +1,79 @@
+/// estimator/batch/batch_unknowns.h - the unknowns that all frames and sweeps of a run have in common: a table with
+/// one row each.
+///
+/// A value is the change from the model to the truth: 0 if the model is exact.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/pose.h"
+
+namespace narpa {
+
+enum class BatchUnknown : std::uint8_t {
+    scale,      ///< of the target's size about its origin: truth / model - 1
+    focal,      ///< of the focal length: truth / model - 1
+    centre_x,   ///< of the principal point, px
+    centre_y,   ///
+    k1,         ///< radial distortion before the model's own: (1 + k1 r^2 + k2 r^4), r = tan(angle from the axis)
+    k2,         ///
+    camera_rx,  ///< rotation of the camera on the chaser, rad, about its own axes
+    camera_ry,  ///
+    camera_rz,  ///
+    camera_x,   ///< shift of the camera, m, in the chaser's axes
+    camera_y,   ///
+    camera_z,   ///
+    lidar_rx,   ///< as those of the camera
+    lidar_ry,   ///
+    lidar_rz,   ///
+    lidar_x,    ///
+    lidar_y,    ///
+    lidar_z,    ///
+    /// Time stamp minus true time, s: of the LiDAR if the camera is used too, whose clock is then right; else of
+    /// the only sensor.
+    clock,
+    range_bias,  ///< measured minus true range, m
+};
+inline constexpr std::size_t kBatchUnknowns = 20;
+
+/// By BatchUnknown; SI units.
+using BatchValues = std::array<double, kBatchUnknowns>;
+
+[[nodiscard]] constexpr double& at(BatchValues& values, BatchUnknown u) {
+    return values[static_cast<std::size_t>(u)];
+}
+[[nodiscard]] constexpr double at(const BatchValues& values, BatchUnknown u) {
+    return values[static_cast<std::size_t>(u)];
+}
+/// Three values from this one on.
+[[nodiscard]] constexpr Vec3 vector_at(const BatchValues& values, BatchUnknown first) {
+    const auto i = static_cast<std::size_t>(first);
+    return {values[i], values[i + 1], values[i + 2]};
+}
+
+struct BatchUnknownRow {
+    std::string_view name;     ///< in options and results, GROUP or GROUP.AXIS; GROUP alone names all of its axes
+    double unit = 1;           ///< SI value of 1 in options and results
+    double default_sigma = 0;  ///< prior standard deviation in `unit`
+    bool by_default = false;   ///< estimated if the user names no unknowns
+    bool of_camera = false, of_lidar = false;  ///< changes what this sensor measures
+};
+[[nodiscard]] std::span<const BatchUnknownRow, kBatchUnknowns> batch_unknowns() noexcept;
+/// The group of a name: all before the point.
+[[nodiscard]] std::string_view group_of(std::string_view name) noexcept;
+/// Names of the groups with the default standard deviations of those estimated by default, for --help.
+[[nodiscard]] std::string help_of_batch_unknowns();
+
+/// Prior standard deviations, SI; 0: known, not estimated.
+[[nodiscard]] BatchValues default_batch_priors();
+
+/// True if an unknown changes what is measured by the sensors that there are.
+[[nodiscard]] bool is_of_sensors(const BatchUnknownRow& row, bool camera, bool lidar) noexcept;
+
+}  // namespace narpa

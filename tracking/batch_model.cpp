@@ -1,0 +1,97 @@
+#include "tracking/batch_model.h"
+
+#include <variant>
+
+#include "renderer/projection/brown_conrady.h"
+#include "renderer/projection/projection_kind.h"
+
+namespace narpa {
+namespace {
+
+Status scale_body(double factor, Body& body, Scene& scene) {
+    const int* mesh = std::get_if<int>(&body.shape);
+    if (!mesh)
+        return Error{"a model error of scale is for a target with a mesh, which body \"" + body.name + "\" is not",
+                     scene.file};
+    for (Vec3f& p : scene.meshes[static_cast<std::size_t>(*mesh)].positions)
+        p = vec_cast<float>(factor * vec_cast<double>(p));
+    for (Mark& m : body.marks) {
+        m.T_body_mark.t = factor * m.T_body_mark.t;
+        m.radius_m *= factor, m.side_m *= factor;
+    }
+    return Ok{};
+}
+
+Status change_projection(const BatchValues& e, Camera& camera, const Scene& scene) {
+    ProjectionParameters p = camera.model->parameters();
+    if (!p.kind)
+        return Error{"camera \"" + camera.name + "\" has a projection without parameters that could be wrong",
+                     scene.file};
+    const double k1 = at(e, BatchUnknown::k1), k2 = at(e, BatchUnknown::k2);
+    if (k1 != 0 || k2 != 0) {
+        if (p.kind == &kPinhole) p = {&kBrownConrady, p.pinhole, {0, 0, 0, 0}};
+        if (p.kind != &kBrownConrady)
+            return Error{
+                "a model error of k1 or k2 is for cameras without distortion or with that of OpenCV, which \"" +
+                    camera.name + "\" is not",
+                scene.file};
+        p.values[0] += k1, p.values[1] += k2;
+    }
+    p.pinhole.fx *= 1 + at(e, BatchUnknown::focal), p.pinhole.fy *= 1 + at(e, BatchUnknown::focal);
+    p.pinhole.cx += at(e, BatchUnknown::centre_x), p.pinhole.cy += at(e, BatchUnknown::centre_y);
+    camera.model = make_projection(p);
+    return Ok{};
+}
+
+/// A sensor without a mount is where the scene puts it: it is then the chaser itself.
+template <class Sensor>
+Status displace(const BatchValues& e, BatchUnknown rotation, BatchUnknown shift, const Sensor& sensor,
+                Rigid3& T_mount_sensor, const Scene& scene) {
+    if (vector_at(e, rotation) == Vec3{} && vector_at(e, shift) == Vec3{}) return Ok{};
+    if (sensor.mount < 0)
+        return Error{"a model error of the mount is for a sensor on a body, which \"" + sensor.name + "\" is not",
+                     scene.file};
+    T_mount_sensor.q = normalized(T_mount_sensor.q * exp_rotation(vector_at(e, rotation)));
+    T_mount_sensor.t = T_mount_sensor.t + vector_at(e, shift);
+    return Ok{};
+}
+
+}  // namespace
+
+Status apply_model_errors(const BatchValues& e, std::size_t target, Scene& scene) {
+    if (at(e, BatchUnknown::scale) != 0)
+        if (Status good = scale_body(1 + at(e, BatchUnknown::scale), scene.bodies[target], scene); !good)
+            return good;
+    for (Camera& c : scene.cameras) {
+        if (Status good = displace(e, BatchUnknown::camera_rx, BatchUnknown::camera_x, c, c.T_mount_camera, scene);
+            !good)
+            return good;
+        for (const BatchUnknown u : {BatchUnknown::focal, BatchUnknown::centre_x, BatchUnknown::centre_y,
+                                     BatchUnknown::k1, BatchUnknown::k2})
+            if (at(e, u) != 0) {
+                if (Status good = change_projection(e, c, scene); !good) return good;
+                break;
+            }
+    }
+    for (Lidar& l : scene.lidars)
+        if (Status good = displace(e, BatchUnknown::lidar_rx, BatchUnknown::lidar_x, l, l.T_mount_lidar, scene);
+            !good)
+            return good;
+    return Ok{};
+}
+
+BatchValues expected_of(const BatchValues& error) {
+    BatchValues expected;
+    for (std::size_t i = 0; i < kBatchUnknowns; ++i) {
+        const auto u = static_cast<BatchUnknown>(i);
+        if (u == BatchUnknown::scale || u == BatchUnknown::focal)
+            expected[i] = 1 / (1 + error[i]) - 1;
+        else if (u == BatchUnknown::clock || u == BatchUnknown::range_bias)
+            expected[i] = error[i];  // of the data, not of the scene
+        else
+            expected[i] = 0 - error[i];
+    }
+    return expected;
+}
+
+}  // namespace narpa

@@ -131,6 +131,16 @@ function(narpa_use_opencv target)
   narpa_link(${target} ${ARGN})
 endfunction()
 
+# Debian's package of Ceres names the static library, which adds 4 MB to each program.
+macro(narpa_find_ceres)
+  find_package(Ceres REQUIRED)
+  find_library(CERES_SHARED_LIBRARY ${CMAKE_SHARED_LIBRARY_PREFIX}ceres${CMAKE_SHARED_LIBRARY_SUFFIX})
+  if(CERES_SHARED_LIBRARY)
+    set_target_properties(Ceres::ceres PROPERTIES IMPORTED_LOCATION ${CERES_SHARED_LIBRARY}
+                                                  IMPORTED_LOCATION_RELEASE ${CERES_SHARED_LIBRARY})
+  endif()
+endmacro()
+
 function(narpa_executable name)
   add_executable(${name} ${ARGN})
   foreach(used narpa-mesh-reader narpa-dem-reader narpa-image-codecs)  # programs that read scenes start or load them

@@ -46,7 +46,7 @@ public:
           size_(kPoseAndExposure + static_cast<Eigen::Index>(columns.size())) {}
 
     /// Design of a pixel: derivative of its normalised residual's expectation.
-    [[nodiscard]] VectorN at(const Residual& r, std::size_t p) const {
+    [[nodiscard]] VectorN at(const PixelResidual& r, std::size_t p) const {
         VectorN x(size_);
         x.head<kPoseAndExposure>() = design(images_, exposure_, p);
         for (std::size_t i = 0; i < columns_.size(); ++i)
@@ -62,7 +62,7 @@ public:
     }
     [[nodiscard]] NuisanceSums equations() const {
         NuisanceSums sums = sum_rows(images_, NuisanceSums::zero(size_), [&](int y, NuisanceSums& row) {
-            residuals_.each(y, [&](const Residual& r, std::size_t p) {
+            residuals_.each(y, [&](const PixelResidual& r, std::size_t p) {
                 const double weight = cauchy_weight(r.r, k_);
                 if (!r.shows_target && !touches(p)) {  // the offset only
                     row.information(7, 7) += weight * r.inverse_s * r.inverse_s;
@@ -83,7 +83,7 @@ public:
     [[nodiscard]] MatrixN scatter(const MatrixN& to, const MatrixN& inverse, const VectorN& step) const {
         const Eigen::Index n = to.cols();
         NuisanceSums sums = sum_rows(images_, NuisanceSums::zero(n), [&](int y, NuisanceSums& row) {
-            residuals_.each(y, [&](const Residual& r, std::size_t p) {
+            residuals_.each(y, [&](const PixelResidual& r, std::size_t p) {
                 const double weight = cauchy_weight(r.r, k_);
                 if (!r.shows_target && !touches(p)) {
                     const double left = weight * (r.r - r.inverse_s * step[7]) * r.inverse_s;
@@ -111,7 +111,7 @@ private:
     const PhotometricImages& images_;
     const Exposure& exposure_;
     const NuisanceColumns& columns_;
-    const Residuals residuals_;
+    const PixelResiduals residuals_;
     const double k_;
     const Eigen::Index size_;
 };

@@ -36,7 +36,7 @@ void add_square(Matrix8& sum, const Vector8& J, double weight, int first) {
 }
 
 /// Sums over blocks of kBlock_px x kBlock_px pixels. k: scale of Cauchy's loss.
-Matrix8 scatter_of_blocks(const PhotometricImages& images, const Residuals& residuals, double k) {
+Matrix8 scatter_of_blocks(const PhotometricImages& images, const PixelResiduals& residuals, double k) {
     constexpr int kBlock_px = 8;
     const auto across = static_cast<std::size_t>(images.width / kBlock_px + 1);
     std::vector<Matrix8> rows(static_cast<std::size_t>(images.height / kBlock_px + 1), Matrix8::Zero());
@@ -44,7 +44,7 @@ Matrix8 scatter_of_blocks(const PhotometricImages& images, const Residuals& resi
         std::vector<Vector8> pulls(across, Vector8::Zero());
         const int first = static_cast<int>(row) * kBlock_px;
         for (int y = std::max(1, first); y < std::min(first + kBlock_px, images.height - 1); ++y)
-            residuals.each(y, [&](const Residual& r, std::size_t p) {
+            residuals.each(y, [&](const PixelResidual& r, std::size_t p) {
                 const double weight = cauchy_weight(r.r, k);
                 const std::size_t x = p % static_cast<std::size_t>(images.width);
                 pulls[x / kBlock_px] += weight * r.r * r.inverse_s * design(images, residuals.exposure(), p);
@@ -69,10 +69,10 @@ PhotometricEquations& PhotometricEquations::operator+=(const PhotometricEquation
 }
 
 double residual_scale(const PhotometricImages& images, const Exposure& exposure, double model_dn2) {
-    const Residuals residuals(images, exposure, model_dn2);
+    const PixelResiduals residuals(images, exposure, model_dn2);
     std::vector<float> size;
     for (int y = 1; y < images.height - 1; ++y)
-        residuals.each(y, [&](const Residual& r, std::size_t) {
+        residuals.each(y, [&](const PixelResidual& r, std::size_t) {
             if (r.shows_target) size.push_back(static_cast<float>(std::abs(r.r)));
         });
     return std::max(1.0, kMadToSigma * static_cast<double>(upper_median(std::span(size))));
@@ -112,10 +112,10 @@ std::array<int, 2> best_shift(const PhotometricImages& images, int most) {
 }
 
 PhotometricCost cost(const PhotometricImages& images, const Exposure& exposure, const Robustness& robust) {
-    const Residuals residuals(images, exposure, robust.model_dn2);
+    const PixelResiduals residuals(images, exposure, robust.model_dn2);
     const double k = robust.cauchy * robust.scale;
     auto sum = sum_rows<PhotometricCost>(images, [&](int y, PhotometricCost& row) {
-        residuals.each(y, [&](const Residual& r, std::size_t) {
+        residuals.each(y, [&](const PixelResidual& r, std::size_t) {
             const double square = r.r * r.r;
             row.robust += std::isfinite(k) ? k * k * std::log1p(square / (k * k)) : square;
             ++row.all_pixels;
@@ -135,7 +135,8 @@ namespace {
 
 /// Residuals are smaller than the noise by the part of it that the fit follows: the pixel's leverage (HC2 of J. G.
 /// MacKinnon, H. White, J. Econometrics 29, 1985).
-void add_scatter(const PhotometricImages& images, const Residuals& residuals, double k, PhotometricEquations& out) {
+void add_scatter(const PhotometricImages& images, const PixelResiduals& residuals, double k,
+                 PhotometricEquations& out) {
     constexpr double kMostLeverage = 0.9;
     struct Sum {
         Matrix8 scatter = Matrix8::Zero();
@@ -147,7 +148,7 @@ void add_scatter(const PhotometricImages& images, const Residuals& residuals, do
     };
     const Matrix8 inverse = out.information.inverse();
     const Sum sum = sum_rows<Sum>(images, [&](int y, Sum& row) {
-        residuals.each(y, [&](const Residual& r, std::size_t p) {
+        residuals.each(y, [&](const PixelResidual& r, std::size_t p) {
             const double weight = cauchy_weight(r.r, k);
             const Vector8 J = r.inverse_s * design(images, residuals.exposure(), p);
             const bool moves = !images.derivative[p].isZero(0);
@@ -166,10 +167,10 @@ void add_scatter(const PhotometricImages& images, const Residuals& residuals, do
 
 PhotometricEquations equations(const PhotometricImages& images, const Exposure& exposure, const Robustness& robust,
                                bool scatter) {
-    const Residuals residuals(images, exposure, robust.model_dn2);
+    const PixelResiduals residuals(images, exposure, robust.model_dn2);
     const double k = robust.cauchy * robust.scale;
     auto out = sum_rows<PhotometricEquations>(images, [&](int y, PhotometricEquations& row) {
-        residuals.each(y, [&](const Residual& r, std::size_t p) {
+        residuals.each(y, [&](const PixelResidual& r, std::size_t p) {
             const double weight = cauchy_weight(r.r, k);
             const Vector8 J = r.inverse_s * design(images, exposure, p);
             const int first = images.derivative[p].isZero(0) ? 6 : 0;  // first column that is not 0
@@ -224,11 +225,11 @@ Vector8 response(const PhotometricImages& images, const Exposure& exposure, cons
             return *this;
         }
     };
-    const Residuals residuals(images, exposure, robust.model_dn2);
+    const PixelResiduals residuals(images, exposure, robust.model_dn2);
     const double k = robust.cauchy * robust.scale;
     return sum_rows<Sum>(images,
                          [&](int y, Sum& row) {
-                             residuals.each(y, [&](const Residual& r, std::size_t p) {
+                             residuals.each(y, [&](const PixelResidual& r, std::size_t p) {
                                  const double weight = cauchy_weight(r.r, k);
                                  const double e = exposure.gain * static_cast<double>(change[p]) * r.inverse_s;
                                  row.gradient += weight * e * r.inverse_s * design(images, exposure, p);
@@ -241,13 +242,13 @@ std::vector<std::uint8_t> informative_pixels(const PhotometricImages& of_samples
                                              double part) {
     PhotometricImages images = of_samples;
     images.signal_variance = {};
-    const Residuals residuals(images, exposure, 0);
+    const PixelResiduals residuals(images, exposure, 0);
     const PhotometricEquations all =
         equations(images, exposure, {1, std::numeric_limits<double>::infinity(), 0}, false);
     const Matrix6 covariance = all.pose_information().inverse();
     std::vector<float> leverage(images.signal.size());
     tbb::parallel_for(1, std::max(images.height - 1, 1), [&](int y) {
-        residuals.each(y, [&](const Residual& r, std::size_t p) {
+        residuals.each(y, [&](const PixelResidual& r, std::size_t p) {
             if (images.derivative[p].isZero(0)) return;
             const Vector6 J = r.inverse_s * exposure.gain * images.derivative[p].cast<double>();
             leverage[p] = static_cast<float>(J.dot(covariance * J));

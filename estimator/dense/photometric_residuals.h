@@ -16,16 +16,16 @@ namespace narpa {
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 using Vector8 = Eigen::Matrix<double, 8, 1>;
 
-struct Residual {
+struct PixelResidual {
     double r = 0;             ///< in units of s
     double inverse_s = 0;     ///< 1 / DN
     double sampling_dn2 = 0;  ///< part of s^2 that is `sampling_factor` times the render's sampling variance
     bool counts = false, shows_target = false;
 };
 
-class Residuals {
+class PixelResiduals {
 public:
-    Residuals(const PhotometricImages& images, const Exposure& exposure, double model_dn2)
+    PixelResiduals(const PhotometricImages& images, const Exposure& exposure, double model_dn2)
         : i_(images), e_(exposure), model_dn2_(model_dn2) {
         [[maybe_unused]] const std::size_t pixels = images.signal.size();
         assert(pixels == static_cast<std::size_t>(images.width) * static_cast<std::size_t>(images.height));
@@ -33,7 +33,7 @@ public:
         assert(images.derivative.empty() || images.derivative.size() == pixels);
     }
 
-    [[nodiscard]] Residual at(int x, int y) const {
+    [[nodiscard]] PixelResidual at(int x, int y) const {
         const auto p =
             static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x);
         const auto at_p = [p](std::span<const float> v) { return v.empty() ? 0.0 : static_cast<double>(v[p]); };
@@ -42,7 +42,7 @@ public:
         const double measured = i_.measured.empty() ? std::min(expected, i_.sensor.top_dn) : at_p(i_.measured);
         const bool clipped = i_.measured.empty() ? expected >= i_.sensor.top_dn
                                                  : !i_.measured_clipped.empty() && i_.measured_clipped[p] != 0;
-        Residual out;
+        PixelResidual out;
         if (clipped && expected >= measured) return out;
         out.sampling_dn2 = e_.gain * e_.gain * i_.sampling_factor * at_p(i_.signal_variance);
         const double variance = i_.sensor.variance_dn2(expected) / i_.pixels_averaged + at_p(i_.measured_variance) +
@@ -59,7 +59,7 @@ public:
     template <class Do>
     void each(int y, Do&& act) const {
         for (int x = 1; x < i_.width - 1; ++x)
-            if (const Residual r = at(x, y); r.counts)
+            if (const PixelResidual r = at(x, y); r.counts)
                 act(r,
                     static_cast<std::size_t>(y) * static_cast<std::size_t>(i_.width) + static_cast<std::size_t>(x));
     }

@@ -19,12 +19,12 @@ struct NoisyPixel {
 
 std::vector<NoisyPixel> pixels_with_sampling_noise(PhotometricImages images, const Exposure& exposure) {
     images.sampling_factor = 1;
-    const Residuals residuals(images, exposure, 0);
+    const PixelResiduals residuals(images, exposure, 0);
     const Matrix8 covariance =
         equations(images, exposure, {1, std::numeric_limits<double>::infinity(), 0}, false).information.inverse();
     std::vector<NoisyPixel> out;
     for (int y = 1; y < images.height - 1; ++y)
-        residuals.each(y, [&](const Residual& r, std::size_t p) {
+        residuals.each(y, [&](const PixelResidual& r, std::size_t p) {
             if (!(r.sampling_dn2 > 0) || images.derivative[p].isZero(0)) return;
             const double variance = 1 / (r.inverse_s * r.inverse_s);
             const Vector8 J = r.inverse_s * design(images, exposure, p);

@@ -20,9 +20,10 @@ namespace {
 constexpr int kFewestNumbers = 8;
 /// Largest part of the marks that may be left out as wrong.
 constexpr double kMostLeftOut = 0.25;
-/// Least part of the discs in view that are used. Of 398 right poses by 10 to 13 lamps all used more than 0.6; of
-/// three wrong ones, which agreed with other bright spots, at most 0.4.
-constexpr double kLeastUsed = 0.5;
+/// Least number of discs used, as a part of those in view that are larger than this and are found almost always. Of
+/// 398 right poses by 10 to 13 lamps all used more than 0.6; of three wrong ones, which agreed with other bright
+/// spots, at most 0.4.
+constexpr double kLeastUsed = 0.5, kSurelyFound_px = 1;
 /// Rays that look whether a disc is hidden go to its centre and to this many points this far outside its rim, at
 /// most at this multiple of its radius. What they meet hides it, or spoils its rim, if it is nearer by this part of
 /// the radius.
@@ -187,10 +188,13 @@ std::string MarkAlignment::too_few(const MarkFit& fitted) const {
     const Rigid3& T = fitted.solution().fit.T_camera_body;
     for (const Mark& m : marks_) {
         const auto view = disc_view(m, T, *camera_.model);
-        if (view && is_in_view(*view, camera_.width, camera_.height) && is_clear(m, *view, T)) ++expected;
+        const bool is_expected = view && view->radius_px > kSurelyFound_px &&
+                                 is_in_view(*view, camera_.width, camera_.height) && is_clear(m, *view, T);
+        if (is_expected) ++expected;
     }
     if (used >= kLeastUsed * expected) return "";
-    return fmt::format("{} of {} marks in view agree, expected at least half: other bright spots?", used, expected);
+    return fmt::format("{} marks agree, expected at least half of the {} in view: other bright spots?", used,
+                       expected);
 }
 
 /// Sets the answer of a fit that has a pose.

@@ -8,12 +8,9 @@
 #include <memory>
 #include <utility>
 
-#include "apps/warnings.h"
+#include "apps/commands/remade.h"
 #include "base/write_file.h"
 #include "emulator/log/run_record.h"
-#include "emulator/replay/replay.h"
-#include "emulator/replay/sweep_replay.h"
-#include "emulator/threads.h"
 #include "tracking/batch_feed.h"
 #include "tracking/batch_model.h"
 #include "tracking/batch_report.h"
@@ -148,32 +145,13 @@ Status track_frames(const BatchPlan& plan, FrameSource& source) {
     auto feed = BatchFrameFeed::create(**model, run.camera_index(), plan.tracker);
     if (!feed) return feed.error();
     source.feed = *std::move(feed);
-    TracingThreads threads(plan.run.threads);
-    Progress progress("estimating poses of " + plan.run.folder);
     const std::int64_t late_ns = plan.lidar.empty() ? plan.stamp_late_ns() : 0;
-    for (std::size_t i = 0; i < run.frames().size(); ++i) {
-        const FrameLedger& ledger = run.frames()[i].ledger;
-        const bool is_wanted = i % static_cast<std::size_t>(plan.run.every) == 0 && run.has_image(i) &&
-                               ledger.delivery == Delivery::frame;
-        if (!is_wanted) {
-            source.feed->pass(ledger, run.world(), run.placement(i));
-            continue;
-        }
-        progress.show(static_cast<double>(i) / static_cast<double>(run.frames().size()),
-                      fmt::format("frame {} of {}", i + 1, run.frames().size()));
-        std::vector<std::string> differs;
-        threads.arena.execute([&] {
-            differs = run.make(i);
-            source.feed->take(ledger, run.bytes(), run.world(), run.placement(i), late_ns);
-        });
-        if (!differs.empty())
-            return Error{
-                fmt::format("frame {} is not the run's any more: {}; expected the scene and the program as "
-                            "they were",
-                            ledger.frame, differs.front()),
-                plan.run.folder + "/" + camera.name + ".ledger.csv", run.frames()[i].line};
-    }
-    return Ok{};
+    return each_frame(
+        plan.run, run,
+        [&](std::size_t i) {
+            source.feed->take(run.frames()[i].ledger, run.bytes(), run.world(), run.placement(i), late_ns);
+        },
+        [&](std::size_t i) { source.feed->pass(run.frames()[i].ledger, run.world(), run.placement(i)); });
 }
 
 /// Makes the sweeps again and tracks the target through them.
@@ -187,33 +165,9 @@ Status track_sweeps(const BatchPlan& plan, SweepSource& source) {
     auto feed = BatchSweepFeed::create(run.world(), **model, run.lidar_index(), sweep_tracker(plan));
     if (!feed) return feed.error();
     source.feed = *std::move(feed);
-    TracingThreads threads(plan.run.threads);
-    Progress progress("estimating poses of " + plan.run.folder);
-    ReplayedSweep made;
-    std::size_t others = 0;
-    const auto next = [&] {
-        const std::size_t skip = source.feed->tracked().empty() ? 0 : static_cast<std::size_t>(plan.run.every) - 1;
-        if (!run.next(skip, made)) return false;
+    return each_sweep(plan.run, run, [&](const ReplayedSweep& made) {
         source.feed->take(made, plan.stamp_late_ns(), at(plan.error, BatchUnknown::range_bias));
-        return true;
-    };
-    while (threads.arena.execute(next)) {
-        progress.show(fmt::format("sweep {}, t = {:.1f} s", made.sweep, 1e-9 * static_cast<double>(made.t_ns)));
-        if (made.repeats.value_or(true)) continue;
-        if (run.is_lockstep())
-            return Error{
-                fmt::format("sweep {} is not the run's any more: expected the scene and the program as they "
-                            "were",
-                            made.sweep),
-                run.log_file(), made.line};
-        ++others;
-    }
-    if (others > 0)
-        warn(
-            fmt::format("{}: {} sweeps differ from those of the run: in real time, poses came too late for their "
-                        "packets",
-                        run.log_file(), others));
-    return Ok{};
+    });
 }
 
 BatchTruth truth_of(const BatchInput& input, const BatchValues& error) {

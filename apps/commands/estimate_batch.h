@@ -27,8 +27,8 @@ struct BatchSensors {
 [[nodiscard]] Outcome estimate_batch(const RunEstimate& run, const BatchSensors& sensors, const BatchFlags& flags,
                                      const TrackerOptions& tracker);
 
-/// Parses NAME=VALUE,... with the names of batch_unknowns(), or of their groups. `lone`: value of a NAME alone,
-/// relative to the row's default; empty: a value is needed. `option`: for messages.
+/// Parses NAME=VALUE,... with the names of batch_unknowns(), or of their groups. `option`: for messages.
+/// `may_be_lone`: a NAME alone has the row's default.
 [[nodiscard]] Result<BatchValues> batch_values(const std::string& text, const std::string& option, bool may_be_lone,
                                                bool may_be_negative);
 

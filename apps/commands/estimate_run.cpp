@@ -6,12 +6,9 @@
 #include <memory>
 #include <utility>
 
-#include "apps/warnings.h"
+#include "apps/commands/remade.h"
 #include "base/write_file.h"
 #include "emulator/log/run_record.h"
-#include "emulator/replay/replay.h"
-#include "emulator/replay/sweep_replay.h"
-#include "emulator/threads.h"
 #include "tracking/estimate_report.h"
 #include "tracking/frame_tracker.h"
 #include "tracking/sweep_tracker.h"
@@ -27,26 +24,11 @@ struct Subject {
 
 /// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
 Result<std::vector<TrackedFrame>> track(const RunEstimate& o, Replay& run, FrameTracker& tracker) {
-    TracingThreads threads(o.threads);
-    Progress progress("estimating poses of " + o.folder);
     std::vector<TrackedFrame> tracked;
-    for (std::size_t i = 0; i < run.frames().size(); i += static_cast<std::size_t>(o.every)) {
-        progress.show(static_cast<double>(i) / static_cast<double>(run.frames().size()),
-                      fmt::format("frame {} of {}", i + 1, run.frames().size()));
-        const FrameLedger& ledger = run.frames()[i].ledger;
-        if (!run.has_image(i) || ledger.delivery != Delivery::frame) continue;
-        std::vector<std::string> differs;
-        threads.arena.execute([&] {
-            differs = run.make(i);
-            tracked.push_back(tracker.take(ledger, run.bytes(), run.placement(i)));
-        });
-        if (!differs.empty())
-            return Error{
-                fmt::format("frame {} is not the run's any more: {}; expected the scene and the program as they "
-                            "were",
-                            ledger.frame, differs.front()),
-                o.folder + "/" + run.camera().name + ".ledger.csv", run.frames()[i].line};
-    }
+    const Status made = each_frame(o, run, [&](std::size_t i) {
+        tracked.push_back(tracker.take(run.frames()[i].ledger, run.bytes(), run.placement(i)));
+    });
+    if (!made) return made.error();
     return tracked;
 }
 
@@ -59,33 +41,11 @@ LidarSweep decoded(const ReplayedSweep& made, const LidarModel& unit) {
 
 /// Makes the sweeps again and tracks the target through them.
 Result<std::vector<TrackedFrame>> track(const RunEstimate& o, SweepReplay& run, SweepTracker& tracker) {
-    TracingThreads threads(o.threads);
-    Progress progress("estimating poses of " + o.folder);
     std::vector<TrackedFrame> tracked;
-    std::size_t others = 0;
-    ReplayedSweep made;
-    const auto next = [&] {
-        const bool is_made = run.next(tracked.empty() ? 0 : static_cast<std::size_t>(o.every) - 1, made);
-        if (is_made)
-            tracked.push_back(
-                tracker.take(made.sweep, made.t_ns, made.t_end_ns, decoded(made, *run.lidar().model)));
-        return is_made;
-    };
-    while (threads.arena.execute(next)) {
-        progress.show(fmt::format("sweep {}, t = {:.1f} s", made.sweep, 1e-9 * static_cast<double>(made.t_ns)));
-        if (made.repeats.value_or(true)) continue;
-        if (run.is_lockstep())
-            return Error{fmt::format("sweep {} is not the run's any more: expected the scene and the program as "
-                                     "they were",
-                                     made.sweep),
-                         run.log_file(), made.line};
-        ++others;
-    }
-    if (others > 0)
-        warn(
-            fmt::format("{}: {} of {} sweeps differ from those of the run: in real time, poses came too late for "
-                        "their packets",
-                        run.log_file(), others, tracked.size()));
+    const Status made = each_sweep(o, run, [&](const ReplayedSweep& s) {
+        tracked.push_back(tracker.take(s.sweep, s.t_ns, s.t_end_ns, decoded(s, *run.lidar().model)));
+    });
+    if (!made) return made.error();
     return tracked;
 }
 

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
 #include "tests/support/paths.h"
@@ -25,19 +24,9 @@ protected:
         ASSERT_TRUE(scene) << scene.error().text();
         RunOptions o;
         o.video = {{"nav", "none"}};
-        o.bus = "log:" + (folder_ / "commands.log");
+        o.bus = record_approach(28'000'000'000, 40'050'000'000);
         o.lockstep = true;
         o.log_folder = log_;
-        const auto bus = open_or_fail(o.bus, CanRole::client);
-        auto rows = read_trajectory(test::build_path("scenes/docking/approach.csv"));
-        ASSERT_TRUE(rows) << rows.error().text();
-        std::uint8_t counter = 0;
-        for (const TrajectoryRow& row : *rows) {
-            if (row.t_ns < 28'000'000'000 || row.t_ns > 40'050'000'000) continue;
-            CanFrame frame;
-            ASSERT_TRUE(encode_fd(PoseCommand{counter++, row.t_ns, row.motion}, 0x100, frame));
-            ASSERT_TRUE(bus->send(frame));
-        }
         ASSERT_NE(ran(*std::move(scene), o), nullptr);
     }
     [[nodiscard]] Done batch(const std::string& options) const {

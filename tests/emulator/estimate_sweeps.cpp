@@ -6,7 +6,6 @@
 
 #include "emulator/replay/sweep_replay.h"
 #include "renderer/camera/scene_camera.h"
-#include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
 #include "tests/support/paths.h"
@@ -27,20 +26,9 @@ protected:
         scene->render.spp = 1;
         scene->cameras[0] = scaled(scene->cameras[0], 0.125, 0.125);
         RunOptions o = sinks;
-        o.bus = "log:" + (folder_ / "commands.log");
+        o.bus = record_approach(40'050'000'000, 40'950'000'000);
         o.lockstep = true;
         o.log_folder = log_;
-        const auto bus = open_or_fail(o.bus, CanRole::client);
-        auto rows = read_trajectory(test::build_path("scenes/docking/approach.csv"));
-        ASSERT_TRUE(rows) << rows.error().text();
-        std::uint8_t counter = 0;
-        for (const TrajectoryRow& row : *rows) {
-            if (row.t_ns < 40'050'000'000 || row.t_ns > 40'950'000'000) continue;
-            CanFrame frame;
-            ASSERT_TRUE(encode_fd(PoseCommand{counter++, row.t_ns, row.motion}, 0x100, frame));
-            ASSERT_TRUE(bus->send(frame));
-        }
-        ASSERT_GT(counter, 2);
         ASSERT_NE(ran(*std::move(scene), o), nullptr);
     }
     static RunOptions with_lidar() {

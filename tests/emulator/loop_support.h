@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <fstream>
 #include <map>
 #include <string>
@@ -13,8 +14,10 @@
 #include "emulator/camera/camera_sensor.h"
 #include "emulator/emulator.h"
 #include "emulator/lidar/lidar_sensor.h"
+#include "emulator/trajectory.h"
 #include "protocols/can/messages.h"
 #include "renderer/scene_file/scene_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -115,6 +118,26 @@ protected:
             EXPECT_TRUE(encode_fd(command(k), 0x100, frame));
             EXPECT_TRUE((*bus)->send(frame));
         }
+        return spec;
+    }
+
+    /// Records the commands of the docking scene's approach in this span of time; returns their BUS.
+    std::string record_approach(std::int64_t from_ns, std::int64_t to_ns) {
+        const std::string spec = "log:" + (folder_ / "commands.log");
+        auto bus = open_can_bus(spec, CanRole::client);
+        const auto rows = read_trajectory(build_path("scenes/docking/approach.csv"));
+        if (!bus || !rows) {
+            ADD_FAILURE() << (bus ? rows.error().text() : bus.error().text());
+            return spec;
+        }
+        std::uint8_t counter = 0;
+        for (const TrajectoryRow& row : *rows) {
+            if (row.t_ns < from_ns || row.t_ns > to_ns) continue;
+            CanFrame frame;
+            EXPECT_TRUE(encode_fd(PoseCommand{counter++, row.t_ns, row.motion}, 0x100, frame));
+            EXPECT_TRUE((*bus)->send(frame));
+        }
+        EXPECT_GT(counter, 2);
         return spec;
     }
 

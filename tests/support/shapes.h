@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -87,15 +88,34 @@ inline Mesh plate(double width_m, double height_m, int cells = 1) {
     return m;
 }
 
+/// Adds a box about T's origin that faces outwards, without materials.
+inline void append_box(Mesh& m, const Vec3& size_m, const Rigid3& T) {
+    const auto first = static_cast<std::uint32_t>(m.positions.size());
+    for (int i = 0; i < 8; ++i)
+        m.positions.push_back(
+            vec_cast<float>(T * Vec3{((i & 1) - 0.5) * size_m.x, (((i >> 1) & 1) - 0.5) * size_m.y,
+                                     (((i >> 2) & 1) - 0.5) * size_m.z}));
+    using Face = std::array<std::uint32_t, 3>;
+    for (const Face& f : {Face{0, 2, 1},
+                          {1, 2, 3},
+                          {4, 5, 6},
+                          {5, 7, 6},
+                          {0, 1, 4},
+                          {1, 5, 4},
+                          {2, 6, 3},
+                          {3, 6, 7},
+                          {0, 4, 2},
+                          {2, 4, 6},
+                          {1, 3, 5},
+                          {3, 7, 5}})
+        m.faces.push_back({first + f[0], first + f[1], first + f[2]});
+}
+
 /// An axis-aligned box about the origin, facing outwards.
 inline Mesh box(double x_m, double y_m, double z_m) {
     Mesh m;
     m.name = "box";
-    for (int i = 0; i < 8; ++i)
-        m.positions.push_back(vec_cast<float>(
-            Vec3{((i & 1) - 0.5) * x_m, (((i >> 1) & 1) - 0.5) * y_m, (((i >> 2) & 1) - 0.5) * z_m}));
-    m.faces = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-               {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    append_box(m, {x_m, y_m, z_m}, {});
     m.face_material.assign(m.faces.size(), 0);
     return m;
 }

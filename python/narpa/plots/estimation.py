@@ -43,7 +43,7 @@ def batch(document):
         rows = [r for r in document["residuals"] if r["sweep"] == of_sweeps]
         if not rows:
             continue
-        residuals.plot(column(rows, "t_s"), positive(column(rows, "start")), ":", color=colour, label=f"{name}, about its own pose, given model")
+        residuals.plot(column(rows, "t_s"), positive(column(rows, "start")), ":", color=colour, label=f"{name}, about own pose")
         residuals.plot(column(rows, "t_s"), positive(column(rows, "end")), color=colour, label=f"{name}, solution")
     logarithmic(residuals, "y")
     residuals.set_ylabel("RMS residual")

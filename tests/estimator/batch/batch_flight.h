@@ -13,7 +13,7 @@
 namespace narpa::test {
 
 /// A target that tumbles and drifts before a chaser; both move freely. Camera axes = chaser axes but for the mount;
-/// the LiDAR looks along its y.
+/// the LiDAR's optical axis is its y.
 class BatchFlight {
 public:
     int frames = 0, sweeps = 0;

@@ -11,62 +11,31 @@
 #include "estimator/view/model_view.h"
 #include "renderer/detector/detector.h"
 #include "renderer/projection/pinhole.h"
+#include "tests/support/cameras.h"
+#include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
-
-/// Adds a box to the mesh.
-void append_box(Mesh& m, const Vec3& size_m, const Rigid3& T) {
-    const auto first = static_cast<std::uint32_t>(m.positions.size());
-    for (int i = 0; i < 8; ++i)
-        m.positions.push_back(
-            vec_cast<float>(T * Vec3{((i & 1) - 0.5) * size_m.x, (((i >> 1) & 1) - 0.5) * size_m.y,
-                                     (((i >> 2) & 1) - 0.5) * size_m.z}));
-    for (const auto& f : {std::array<std::uint32_t, 3>{0, 2, 1},
-                          {1, 2, 3},
-                          {4, 5, 6},
-                          {5, 7, 6},
-                          {0, 1, 4},
-                          {1, 5, 4},
-                          {2, 6, 3},
-                          {3, 6, 7},
-                          {0, 4, 2},
-                          {2, 4, 6},
-                          {1, 3, 5},
-                          {3, 7, 5}})
-        m.faces.push_back({first + f[0], first + f[1], first + f[2]});
-}
 
 /// A bracket of three plates, which light each other, with a mast.
 Scene bracket(float albedo) {
     Scene s;
     s.sun = Sun{normalized(Vec3{0.5, -0.45, -0.7}), 1361, 0};
-    Material grey;
-    grey.diffuse = {albedo, albedo, albedo};
-    s.materials.push_back(std::move(grey));
+    s.materials.push_back(test::lambert(albedo));
     Mesh mesh;
-    append_box(mesh, {2, 2, 0.1}, {});
-    append_box(mesh, {2, 0.1, 1.6}, {{}, {0, 1, 0.75}});
-    append_box(mesh, {0.1, 2, 1.2}, {{}, {-1, 0, 0.55}});
-    append_box(mesh, {0.2, 0.2, 1.3}, {exp_rotation({0.3, 0.2, 0}), {0.5, -0.4, 0.6}});
+    test::append_box(mesh, {2, 2, 0.1}, {});
+    test::append_box(mesh, {2, 0.1, 1.6}, {{}, {0, 1, 0.75}});
+    test::append_box(mesh, {0.1, 2, 1.2}, {{}, {-1, 0, 0.55}});
+    test::append_box(mesh, {0.2, 0.2, 1.3}, {exp_rotation({0.3, 0.2, 0}), {0.5, -0.4, 0.6}});
     mesh.face_material.assign(mesh.faces.size(), 0);
     s.meshes.push_back(std::move(mesh));
     Body body;
     body.shape = 0;
     s.bodies.push_back(std::move(body));
-    Camera c;
-    c.width = 128, c.height = 96;
+    Camera c = test::square_camera(128);
+    c.height = 96;
     c.model = std::make_shared<const Pinhole>(200, 200, 63.5, 47.5);
     c.format = PixelFormat::y16;
-    c.detector = Detector{.exposure_s = 3e-5,
-                          .pixel_pitch_m = 5e-6,
-                          .f_number = 4,
-                          .quantum_efficiency = 0.5,
-                          .full_well_e = 20000,
-                          .read_noise_e = 12,
-                          .shot_noise = true,
-                          .black_level_dn = 32,
-                          .bits = 12};
     s.cameras.push_back(std::move(c));
     return s;
 }

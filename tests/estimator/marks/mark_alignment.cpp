@@ -42,8 +42,8 @@ public:
     [[nodiscard]] const Camera& camera() const { return camera_; }
     [[nodiscard]] const std::vector<Mark>& marks() const { return scene_.bodies[0].marks; }
 
-    /// T_camera_target of a camera at this position in the body's axes that looks along -x, rotated by a rotation
-    /// vector in its own axes.
+    /// T_camera_target of a camera at this position in the body's axes with its optical axis along -x, rotated by a
+    /// rotation vector in its own axes.
     [[nodiscard]] static Rigid3 seen_from(const Vec3& position_m, const Vec3& rotation_rad = {}) {
         const Quat facing{0.5, -0.5, -0.5, 0.5};  // camera x, y, z = body y, -z, -x
         return inverse(Rigid3{normalized(facing * exp_rotation(rotation_rad)), position_m});

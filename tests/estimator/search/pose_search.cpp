@@ -17,43 +17,24 @@
 #include "estimator/view/model_view.h"
 #include "renderer/detector/detector.h"
 #include "tests/support/cameras.h"
+#include "tests/support/shapes.h"
 
 namespace narpa {
 namespace {
 
-void append_box(Mesh& mesh, const Vec3& size_m, const Rigid3& T) {
-    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-    for (int i = 0; i < 8; ++i)
-        mesh.positions.push_back(vec_cast<float>(
-            T * Vec3{((i & 1) - 0.5) * size_m.x, ((i >> 1 & 1) - 0.5) * size_m.y, ((i >> 2) - 0.5) * size_m.z}));
-    constexpr std::array<std::array<std::uint32_t, 3>, 12> kFaces{{{0, 2, 1},
-                                                                   {1, 2, 3},
-                                                                   {4, 5, 6},
-                                                                   {5, 7, 6},
-                                                                   {0, 1, 4},
-                                                                   {1, 5, 4},
-                                                                   {2, 6, 3},
-                                                                   {3, 6, 7},
-                                                                   {0, 4, 2},
-                                                                   {2, 4, 6},
-                                                                   {1, 3, 5},
-                                                                   {3, 7, 5}}};
-    for (const auto& f : kFaces) mesh.faces.push_back({first + f[0], first + f[1], first + f[2]});
-}
-
 /// A bus, two unlike panels and a mast: no two of its sides are alike.
 Mesh small_craft() {
     Mesh m;
-    append_box(m, {1.4, 1, 0.9}, {});
-    append_box(m, {0.8, 1.6, 0.06}, {exp_rotation({0, 0.4, 0}), {0.2, 1.3, 0}});
-    append_box(m, {0.6, 0.9, 0.06}, {exp_rotation({0, -0.4, 0}), {-0.1, -0.95, 0.1}});
-    append_box(m, {0.2, 0.2, 1.1}, {{}, {-0.5, 0.3, 0.9}});
+    test::append_box(m, {1.4, 1, 0.9}, {});
+    test::append_box(m, {0.8, 1.6, 0.06}, {exp_rotation({0, 0.4, 0}), {0.2, 1.3, 0}});
+    test::append_box(m, {0.6, 0.9, 0.06}, {exp_rotation({0, -0.4, 0}), {-0.1, -0.95, 0.1}});
+    test::append_box(m, {0.2, 0.2, 1.1}, {{}, {-0.5, 0.3, 0.9}});
     return m;
 }
 
 Mesh cube() {
     Mesh m;
-    append_box(m, {2, 2, 2}, {});
+    test::append_box(m, {2, 2, 2}, {});
     return m;
 }
 

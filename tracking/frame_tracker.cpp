@@ -30,17 +30,22 @@ Result<std::unique_ptr<FrameTracker>> FrameTracker::create(const World& world, s
     return std::unique_ptr<FrameTracker>(new FrameTracker(world, camera, *target, options));
 }
 
-Status FrameTracker::set(const FrameLedger& ledger) {
-    if (!camera_.control) return Ok{};
-    const Camera& as_in_the_scene = world_.scene().cameras[index_];
+Status set_to_frame(const FrameLedger& ledger, const Camera& as_in_the_scene, Camera& camera) {
+    if (!camera.control) return Ok{};
     const CameraSettings taken = settings_of(ledger, as_in_the_scene);
-    apply(taken, as_in_the_scene, camera_);
-    estimator_->set_detector(*camera_.detector);
-    if (search_) search_->set_detector(*camera_.detector);
-    if (taken.binning == 1 && taken.region.width == camera_.width && taken.region.height == camera_.height)
+    apply(taken, as_in_the_scene, camera);
+    if (taken.binning == 1 && taken.region.width == camera.width && taken.region.height == camera.height)
         return Ok{};
     return Error{fmt::format("{} x {} pixels, binned by {}: expected the whole image, not binned",
                              taken.region.width, taken.region.height, taken.binning)};
+}
+
+Status FrameTracker::set(const FrameLedger& ledger) {
+    const Status whole = set_to_frame(ledger, world_.scene().cameras[index_], camera_);
+    if (!camera_.control) return whole;
+    estimator_->set_detector(*camera_.detector);
+    if (search_) search_->set_detector(*camera_.detector);
+    return whole;
 }
 
 ApparentMotion FrameTracker::motion(const FrameLedger& ledger, const BodyPoses& at, const Rigid3& guess) const {

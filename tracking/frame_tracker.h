@@ -15,6 +15,10 @@ namespace narpa {
 struct DenseOptions;
 class PoseSearch;
 
+/// Sets exposure and gain of an operated camera to those of a frame. An Error where the frame is a part of the
+/// image or of binned pixels.
+[[nodiscard]] Status set_to_frame(const FrameLedger& ledger, const Camera& as_in_the_scene, Camera& camera);
+
 class FrameTracker {
 public:
     /// `world` outlives it. Errors: no such target, no body to estimate, options.

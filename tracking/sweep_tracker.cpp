@@ -69,18 +69,12 @@ ApparentMotion SweepTracker::motion_about(std::int64_t t_ns, std::int64_t length
                           1e-9 * static_cast<double>(length_ns));
 }
 
-double SweepTracker::search_radius_m(const TrackedFrame& out) const {
-    const TrackerOptions& o = tracker_.options();
-    if (!tracker_.predicts()) return 0.01 * o.start_percent * norm(out.truth.t) + o.start_deg * kDegree * reach_m_;
-    const Matrix6 known = tracker_.filter().pose({}).covariance;  // its size is the same in all axes
-    return narpa::search_radius_m(position_sigma(known), rotation_sigma(known), reach_m_);
-}
-
 void SweepTracker::measure(const Quat& q_frame_chaser, TrackedFrame& out) {
-    const auto e = search_ && !tracker_.started()
-                       ? search_->find(sweep_.points, motion_, sweep_.empty)
-                       : icp_.align(sweep_.points, motion_, out.guess, search_radius_m(out), sweep_.empty,
-                                    tracker_.guess_covariance(T_chaser_lidar(), q_frame_chaser, out.guess));
+    const auto e =
+        search_ && !tracker_.started()
+            ? search_->find(sweep_.points, motion_, sweep_.empty)
+            : icp_.align(sweep_.points, motion_, out.guess, tracker_.search_radius_m(norm(out.truth.t), reach_m_),
+                         sweep_.empty, tracker_.guess_covariance(T_chaser_lidar(), q_frame_chaser, out.guess));
     if (!e) {
         out.why = e.error().what;
         return;

@@ -40,7 +40,6 @@ private:
     /// The truth. `q_frame_chaser`: if not null, receives the chaser's attitude.
     [[nodiscard]] Rigid3 T_lidar_target_at(std::int64_t t_ns, Quat* q_frame_chaser = nullptr) const;
     [[nodiscard]] ApparentMotion motion_about(std::int64_t t_ns, std::int64_t length_ns) const;
-    [[nodiscard]] double search_radius_m(const TrackedFrame& out) const;
     void measure(const Quat& q_frame_chaser, TrackedFrame& out);
     /// The chaser is the body that carries the LiDAR, or the LiDAR itself.
     [[nodiscard]] Rigid3 T_chaser_lidar() const { return lidar_.mount < 0 ? Rigid3{} : lidar_.T_mount_lidar; }

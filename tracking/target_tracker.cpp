@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "estimator/cloud/cloud_icp.h"
+
 namespace narpa {
 namespace {
 
@@ -104,6 +106,12 @@ Matrix6 TargetTracker::guess_covariance(const Rigid3& T_chaser_sensor, const Qua
     if (!predicts()) return start_covariance(options_, norm(guess.t));
     return covariance_in_other_axes(conjugate(T_chaser_sensor.q), filter().pose(q_frame_chaser).covariance) +
            covariance_of_model_;
+}
+
+double TargetTracker::search_radius_m(double range_m, double reach_m) const {
+    if (!predicts()) return 0.01 * options_.start_percent * range_m + options_.start_deg * kDegree * reach_m;
+    const Matrix6 known = filter().pose({}).covariance;  // its size is the same in all axes
+    return narpa::search_radius_m(position_sigma(known), rotation_sigma(known), reach_m);
 }
 
 ApparentMotion TargetTracker::motion(const Rigid3& T_chaser_sensor, const Rigid3& T_sensor_target,

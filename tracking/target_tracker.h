@@ -100,6 +100,9 @@ public:
     /// Covariance of the guess's error, sensor axes.
     [[nodiscard]] Matrix6 guess_covariance(const Rigid3& T_chaser_sensor, const Quat& q_frame_chaser,
                                            const Rigid3& guess) const;
+    /// For estimates of points: how far the guess may be off at the target's surface, whose bounding radius is
+    /// `reach_m`; 0: so little that no search is needed.
+    [[nodiscard]] double search_radius_m(double range_m, double reach_m) const;
     /// The target's motion in the sensor's axes during a measurement of this length about a pose in its middle, as
     /// the filter knows it. `q_frame_chaser`: at begin, middle and end.
     [[nodiscard]] ApparentMotion motion(const Rigid3& T_chaser_sensor, const Rigid3& T_sensor_target,

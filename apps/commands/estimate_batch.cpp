@@ -150,6 +150,7 @@ Status track_frames(const BatchPlan& plan, FrameSource& source) {
         plan.run, run,
         [&](std::size_t i) {
             source.feed->take(run.frames()[i].ledger, run.bytes(), run.world(), run.placement(i), late_ns);
+            return Ok{};
         },
         [&](std::size_t i) { source.feed->pass(run.frames()[i].ledger, run.world(), run.placement(i)); });
 }

@@ -16,17 +16,12 @@
 namespace narpa::cli {
 namespace {
 
-/// What was estimated, from what, and how.
-struct Subject {
-    std::string kind, sensor, target, method;  ///< kind: "camera" or "lidar"
-    std::string scene, item;                   ///< item: "frame" or "sweep"
-};
-
 /// Renders the frames again, bit for bit, and tracks the target through them as navigation would.
 Result<std::vector<TrackedFrame>> track(const RunEstimate& o, Replay& run, FrameTracker& tracker) {
     std::vector<TrackedFrame> tracked;
     const Status made = each_frame(o, run, [&](std::size_t i) {
         tracked.push_back(tracker.take(run.frames()[i].ledger, run.bytes(), run.placement(i)));
+        return Ok{};
     });
     if (!made) return made.error();
     return tracked;
@@ -55,27 +50,6 @@ Status write_rows(const std::string& path, const std::vector<TrackedFrame>& trac
     return write_file(path, rows);
 }
 
-Outcome report(const RunEstimate& o, const Subject& of, const std::vector<TrackedFrame>& tracked) {
-    const EstimateSummary summary = summarise(tracked);
-    say(fmt::format("{}: {} {}, target {}, by {}: {}", o.folder, of.kind, of.sensor, of.target, of.method,
-                    to_text(summary, of.item)));
-    if (!o.csv.empty())
-        if (auto written = write_rows(o.csv, tracked); !written) return written.error();
-    if (!o.picture.empty()) {
-        const std::string title =
-            fmt::format("{}: {} seen by {}, by {}", of.scene, of.target, of.sensor, of.method);
-        if (auto written = plot_estimates(o.picture, title, tracked); !written) return written.error();
-    }
-    for (const std::string& file : {o.csv, o.picture})
-        if (!file.empty()) say("wrote " + file);
-    return nlohmann::json{{"passed", summary.measured > 0},
-                          {"log", o.folder},
-                          {of.kind, of.sensor},
-                          {"target", of.target},
-                          {"method", of.method},
-                          {"summary", to_json(summary)}};
-}
-
 Outcome estimate_frames(const RunEstimate& o, const TrackerOptions& options) {
     auto run = Replay::open(o.folder, o.sensor, o.scene);
     if (!run) return run.error();
@@ -84,10 +58,10 @@ Outcome estimate_frames(const RunEstimate& o, const TrackerOptions& options) {
     const auto tracked = track(o, **run, **tracker);
     if (!tracked) return tracked.error();
     const Scene& scene = (*run)->world().scene();
-    return report(o,
-                  {"camera", (*run)->camera().name, scene.bodies[(*tracker)->target()].name,
-                   std::string(options.method->name), scene.name, "frame"},
-                  *tracked);
+    return report_run(o,
+                      {"camera", (*run)->camera().name, scene.bodies[(*tracker)->target()].name,
+                       std::string(options.method->name), scene.name, "frame"},
+                      *tracked);
 }
 
 Outcome estimate_sweeps(const RunEstimate& o, const TrackerOptions& options) {
@@ -104,7 +78,7 @@ Outcome estimate_sweeps(const RunEstimate& o, const TrackerOptions& options) {
                                  (*run)->lidar().name, 1 / (*run)->lidar().model->spec().rate_hz),
                      o.folder};
     const Scene& scene = (*run)->world().scene();
-    return report(
+    return report_run(
         o, {"lidar", (*run)->lidar().name, scene.bodies[(*tracker)->target()].name, "icp", scene.name, "sweep"},
         *tracked);
 }
@@ -127,6 +101,27 @@ Result<bool> is_lidar(const RunEstimate& o) {
 }
 
 }  // namespace
+
+Outcome report_run(const RunEstimate& o, const EstimatedRun& of, const std::vector<TrackedFrame>& tracked) {
+    const EstimateSummary summary = summarise(tracked);
+    say(fmt::format("{}: {} {}, target {}, by {}: {}", o.folder, of.kind, of.sensor, of.target, of.method,
+                    to_text(summary, of.item)));
+    if (!o.csv.empty())
+        if (auto written = write_rows(o.csv, tracked); !written) return written.error();
+    if (!o.picture.empty()) {
+        const std::string title =
+            fmt::format("{}: {} seen by {}, by {}", of.scene, of.target, of.sensor, of.method);
+        if (auto written = plot_estimates(o.picture, title, tracked); !written) return written.error();
+    }
+    for (const std::string& file : {o.csv, o.picture})
+        if (!file.empty()) say("wrote " + file);
+    return nlohmann::json{{"passed", summary.measured > 0},
+                          {"log", o.folder},
+                          {of.kind, of.sensor},
+                          {"target", of.target},
+                          {"method", of.method},
+                          {"summary", to_json(summary)}};
+}
 
 Outcome estimate_run(const RunEstimate& o, const TrackerOptions& tracker) {
     if (auto made = make_folder_of(o.csv); !made) return made.error();

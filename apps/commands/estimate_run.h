@@ -19,6 +19,15 @@ struct RunEstimate {
         of_sweeps{};  ///< options that were given and have no meaning for the other
 };
 
+/// What was estimated, from what, and how.
+struct EstimatedRun {
+    std::string kind, sensor, target, method;  ///< kind: "camera", "lidar" or "cameras"
+    std::string scene, item;                   ///< item: "frame", "sweep" or "pair"
+};
+/// Prints the summary, writes `csv` and `picture`, and returns the document.
+[[nodiscard]] Outcome report_run(const RunEstimate& options, const EstimatedRun& of,
+                                 const std::vector<TrackedFrame>& tracked);
+
 [[nodiscard]] Outcome estimate_run(const RunEstimate& options, const TrackerOptions& tracker);
 
 }  // namespace narpa::cli

@@ -10,7 +10,16 @@
 
 namespace narpa::cli {
 
-Status each_frame(const RunEstimate& o, Replay& run, const std::function<void(std::size_t)>& take,
+Status make_again(const RunEstimate& o, Replay& run, std::size_t i) {
+    const std::vector<std::string> differs = run.make(i);
+    if (differs.empty()) return Ok{};
+    return Error{
+        fmt::format("frame {} is not the run's any more: {}; expected the scene and the program as they were",
+                    run.frames()[i].ledger.frame, differs.front()),
+        o.folder + "/" + run.camera().name + ".ledger.csv", run.frames()[i].line};
+}
+
+Status each_frame(const RunEstimate& o, Replay& run, const std::function<Status(std::size_t)>& take,
                   const std::function<void(std::size_t)>& pass) {
     TracingThreads threads(o.threads);
     Progress progress("estimating poses of " + o.folder);
@@ -24,17 +33,12 @@ Status each_frame(const RunEstimate& o, Replay& run, const std::function<void(st
             continue;
         }
         progress.show(static_cast<double>(i) / static_cast<double>(n), fmt::format("frame {} of {}", i + 1, n));
-        std::vector<std::string> differs;
+        Status done = Ok{};
         threads.arena.execute([&] {
-            differs = run.make(i);
-            take(i);
+            done = make_again(o, run, i);
+            if (done) done = take(i);
         });
-        if (!differs.empty())
-            return Error{
-                fmt::format("frame {} is not the run's any more: {}; expected the scene and the program as they "
-                            "were",
-                            ledger.frame, differs.front()),
-                o.folder + "/" + run.camera().name + ".ledger.csv", run.frames()[i].line};
+        if (!done) return done;
     }
     return Ok{};
 }

@@ -11,9 +11,12 @@
 
 namespace narpa::cli {
 
+/// Makes frame i again. An Error where it is not the run's.
+[[nodiscard]] Status make_again(const RunEstimate& o, Replay& run, std::size_t i);
+
 /// Makes every `o.every`-th frame again that was sent, and calls `take` with its index in run.frames(). `pass`, if
-/// any: called for the others. Errors: a frame that is not the run's.
-[[nodiscard]] Status each_frame(const RunEstimate& o, Replay& run, const std::function<void(std::size_t)>& take,
+/// any: called for the others. Ends at the first Error: a frame that is not the run's, or one of `take`.
+[[nodiscard]] Status each_frame(const RunEstimate& o, Replay& run, const std::function<Status(std::size_t)>& take,
                                 const std::function<void(std::size_t)>& pass = {});
 
 /// Makes every `o.every`-th sweep again. Errors: one that is not that of a run in lockstep; a warning counts those

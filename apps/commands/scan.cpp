@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/cli.h"
+#include "apps/commands/cloud_file.h"
 #include "apps/outputs.h"
 #include "apps/scene_argument.h"
 #include "apps/scene_options.h"
@@ -40,21 +41,6 @@ void add_points(const LidarUnit& unit, std::vector<std::string>& lines) {
         }
 }
 
-/// ASCII; both formats begin with the number of points.
-void write_cloud(std::ostream& out, bool ply, const std::vector<std::string>& lines) {
-    if (ply)
-        out << fmt::format(
-            "ply\nformat ascii 1.0\ncomment LiDAR frame, metres\nelement vertex {}\nproperty float x\n"
-            "property float y\nproperty float z\nproperty float intensity\nend_header\n",
-            lines.size());
-    else
-        out << fmt::format(
-            "# .PCD v0.7\n# LiDAR frame, metres\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\n"
-            "COUNT 1 1 1 1\nWIDTH {0}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA ascii\n",
-            lines.size());
-    for (const std::string& line : lines) out << line;
-}
-
 using FireAll = std::function<void(const Writer&)>;
 
 Status write_text(const std::string& path, const std::string& extension, const FireAll& fire_all) {
@@ -68,9 +54,10 @@ Status write_text(const std::string& path, const std::string& extension, const F
                 out << std::string_view(row.data(), format_shot_row(row, unit, packet, i));
         });
     } else {
+        constexpr std::array<std::string_view, 4> kFields{"x", "y", "z", "intensity"};
         std::vector<std::string> lines;
         fire_all([&](std::int64_t, const LidarUnit& unit) { add_points(unit, lines); });
-        write_cloud(out, extension == ".ply", lines);
+        write_cloud(out, extension == ".ply", "LiDAR frame, metres", kFields, lines);
     }
     out.close();
     if (!out) return Error{"cannot be written to the end", path, 0, 0, ErrorKind::failed};

@@ -65,7 +65,7 @@ void BeamAssociation::take(std::span<const RangePoint> points, const ApparentMot
     beams_.clear();
     nearest_m_ = points.empty() ? 0 : std::ranges::min_element(points, {}, &RangePoint::range_m)->range_m;
     for (const RangePoint& p : points) {
-        Beam b{{}, p.origin_m - p.t_s * motion.velocity_m_s, p.direction, p.range_m};
+        Beam b{{}, p.origin_m - p.t_s * motion.velocity_m_s, p.direction, p.range_m, p.sigma_m};
         if (turning_) {
             b.turn = exp_rotation(p.t_s * motion.rate_rad_s);
             b.origin_m = conjugate(b.turn) * b.origin_m;
@@ -94,14 +94,14 @@ void BeamAssociation::associate(const Rigid3& T, const RangeNoise& noise, double
         const Beam& beam = beams_[k * stride];
         const double cosine = -dot(p.normal, conjugate(T.q) * beam.direction);
         if (search_m > 0) {
-            p.sigma_m = std::hypot(noise.range_m, 0.25 * search_m);
+            p.sigma_m = std::hypot(range_sigma_m(beam, noise), 0.25 * search_m);
             continue;
         }
         if (!(cosine >= kGrazingCosine)) {
             p.fate = BeamClass::grazing;
             continue;
         }
-        const double along = noise.range_m * cosine;
+        const double along = range_sigma_m(beam, noise) * cosine;
         const double across = beam.range_m * noise.pointing_rad * std::sqrt(std::max(0.0, 1 - cosine * cosine));
         p.sigma_m = std::sqrt(along * along + across * across);
     }
@@ -225,7 +225,7 @@ bool BeamAssociation::may_be_on_other_surface(const Rigid3& T, const RangeNoise&
         const double cosine = std::abs(dot(normal, direction));
         if (dot(normal, p.normal) > kOtherSurface || cosine < kGrazingCosine) return;
         const double distance_m = scale_ * dot(normal, point - hits.position[lane]);
-        elsewhere |= std::abs(distance_m) < kOnOther * noise.range_m * cosine;
+        elsewhere |= std::abs(distance_m) < kOnOther * range_sigma_m(beam, noise) * cosine;
     });
     return elsewhere;
 }

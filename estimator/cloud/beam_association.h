@@ -82,11 +82,15 @@ public:
 private:
     /// A beam relative to a stationary target: compensated for the target's motion since the time of the pose.
     struct Beam {
-        Quat turn{};               ///< rotation of the target since then, LiDAR axes
-        Vec3 origin_m, direction;  ///< rotated back
-        double range_m = 0;
-        bool edge = false;  ///< set by find_edges
+        Quat turn{};                      ///< rotation of the target since then, LiDAR axes
+        Vec3 origin_m, direction;         ///< rotated back
+        double range_m = 0, sigma_m = 0;  ///< as RangePoint
+        bool edge = false;                ///< set by find_edges
     };
+    /// Standard deviation of the beam's range.
+    [[nodiscard]] static double range_sigma_m(const Beam& beam, const RangeNoise& noise) noexcept {
+        return beam.sigma_m > 0 ? beam.sigma_m : noise.range_m;
+    }
     /// The beam in model coordinates, which are target coordinates divided by the scale.
     [[nodiscard]] Ray in_model(const Rigid3& T_lidar_target, const Beam& beam) const noexcept;
     void along_beams(const Rigid3& T, std::size_t stride, std::vector<PointToPlane>& out) const;

@@ -75,8 +75,8 @@ void CloudIcp::set_covariance(const PlaneEquations& equations, const Matrix6& in
     const double factor = equations.variance_factor();
     const Observability& o = out.observability;
     PoseShifts by_model = PoseShifts::Zero(6, 0);
-    if (const ModelUncertainty& u = settings_.model; u != ModelUncertainty{})
-        by_model = joined(pose_shifts(u, out.T_lidar_target, motion_), equations.shifts(u, o));
+    if (settings_.model != ModelUncertainty{} || have_common_errors_)
+        by_model = joined(pose_shifts(settings_.model, out.T_lidar_target, motion_), equations.shifts(o));
     out.covariance_of_model = covariance_by(by_model);
     out.bound = o.covariance(equations.information(), 1, start_covariance_) + out.covariance_of_model;
     out.covariance = o.covariance(information, factor, start_covariance_) + out.covariance_of_model;
@@ -128,6 +128,11 @@ void CloudIcp::leave_out_unchecked_points(const Rigid3& start, CloudEstimate& ou
     }
 }
 
+/// Shifts of a point's range by one standard deviation of each common error.
+Eigen::RowVector3d CloudIcp::common_errors_m(const RangePoint& p) const {
+    return {settings_.model.range_bias_m, p.common_m[0], p.common_m[1]};
+}
+
 std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search_m, std::size_t stride,
                                                   CloudEstimate& out) {
     association_.set_scale(1 + out.scale);
@@ -155,7 +160,8 @@ std::optional<PlaneEquations> CloudIcp::linearise(const Rigid3& T, double search
         const Vector6 by_pose = association_.derivative(T, k * stride, p) / p.sigma_m;
         const double weight = equations.add({.distance = e,
                                              .by_pose = by_pose,
-                                             .by_range = association_.along_beam(T, k * stride, p) / p.sigma_m,
+                                             .by_common = association_.along_beam(T, k * stride, p) / p.sigma_m *
+                                                          common_errors_m(points_[k * stride]),
                                              .by_scale = -dot(p.normal, p.surface_m) / p.sigma_m,
                                              .sigma_m = p.sigma_m,
                                              .at_m = T.q * p.surface_m});
@@ -334,6 +340,8 @@ Status CloudIcp::begin(std::span<const RangePoint> points, const ApparentMotion&
     empty_beams_.take(points, empty, motion);
     points_ = points;
     motion_ = motion;
+    have_common_errors_ =
+        std::ranges::any_of(points, [](const RangePoint& p) { return p.common_m != decltype(p.common_m){}; });
     planes_.reserve(points.size());
     magnitudes_.reserve(points.size());
     rows_.reserve(points.size());
@@ -385,7 +393,7 @@ Result<CloudEstimate> CloudIcp::align(std::span<const RangePoint> points, const 
         }
     if (out.used < kFewestSweepPoints) {
         out.answer.why =
-            fmt::format("only {} of {} returns meet the target where it is taken to be, expected at least {}",
+            fmt::format("only {} of {} points meet the target where it is taken to be, expected at least {}",
                         out.used, points.size(), kFewestSweepPoints);
         return out;
     }

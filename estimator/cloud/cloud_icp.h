@@ -118,6 +118,7 @@ private:
     [[nodiscard]] std::optional<PlaneEquations> linearise(const Rigid3& T, double search_m, std::size_t stride,
                                                           CloudEstimate& out);
     [[nodiscard]] CloudEstimate attempt(const Rigid3& start, double search_m, std::size_t points, int radii);
+    [[nodiscard]] Eigen::RowVector3d common_errors_m(const RangePoint& p) const;
     [[nodiscard]] double edges_hold_m() const;
     void refit_missed_beams(CloudEstimate& found);
     [[nodiscard]] static bool may_have_rivals(const CloudEstimate& e);
@@ -131,6 +132,7 @@ private:
     EmptyBeams empty_beams_;
     ApparentMotion motion_{};  ///< of the sweep
     std::span<const RangePoint> points_;
+    bool have_common_errors_ = false;  ///< RangePoint::common_m
     std::vector<PointToPlane> planes_;
     std::vector<WeightedRow> rows_;  ///< of the points used
     std::vector<WeightedRow> checked_rows_;

@@ -30,7 +30,7 @@ double PlaneEquations::add(const PlaneResidual& p) {
     hessian_ += robust.weight * JJ;
     gradient_ -= robust.weight * p.distance * p.by_pose;
     information_ += JJ;
-    by_range_ -= robust.weight * p.by_range * p.by_pose;
+    by_common_ -= robust.weight * p.by_pose * p.by_common;
     by_scale_ -= robust.weight * p.by_scale * p.by_pose;
     scale_hessian_ += robust.weight * p.by_scale * p.by_scale;
     scale_gradient_ -= robust.weight * p.distance * p.by_scale;
@@ -64,12 +64,12 @@ PlaneEquations::Step PlaneEquations::step(const Observability& observability) co
     return s;
 }
 
-PoseShifts PlaneEquations::shifts(const ModelUncertainty& model, const Observability& observability) const {
-    PoseShifts out = PoseShifts::Zero(6, 2);
-    out.col(0) = model.range_bias_m * observability.solve(hessian_, by_range_);
+PoseShifts PlaneEquations::shifts(const Observability& observability) const {
+    PoseShifts out = PoseShifts::Zero(6, 4);
+    for (int i = 0; i < 3; ++i) out.col(i) = observability.solve(hessian_, by_common_.col(i));
     if (size_is_known_) return out;
     const Vector6 by_scale = observability.solve(hessian_, by_scale_);
-    out.col(1) = by_scale / std::sqrt(scale_hessian_ - by_scale_.dot(by_scale));
+    out.col(3) = by_scale / std::sqrt(scale_hessian_ - by_scale_.dot(by_scale));
     return out;
 }
 

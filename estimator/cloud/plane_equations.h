@@ -15,7 +15,9 @@ namespace narpa {
 struct PlaneResidual {
     double distance = 0;
     Vector6 by_pose = Vector6::Zero();
-    double by_range = 0;  ///< per metre of range
+    /// By one standard deviation of each error that all ranges have in common: ModelUncertainty::range_bias_m, and
+    /// RangePoint::common_m.
+    Eigen::RowVector3d by_common = Eigen::RowVector3d::Zero();
     double by_scale = 0;  ///< per unit of relative size: a model twice as large
     double sigma_m = 0;   ///< standard deviation of the distance
     Vec3 at_m{};          ///< hit on the model, relative to the target's origin, LiDAR axes
@@ -42,9 +44,9 @@ public:
         return observability.solve(hessian_, gradient_);
     }
     [[nodiscard]] Step step(const Observability& observability) const;
-    /// Shifts of the pose by unknowns of the model: by the ranges' common bias, and by the part of the model's size
-    /// that the points leave unknown.
-    [[nodiscard]] PoseShifts shifts(const ModelUncertainty& model, const Observability& observability) const;
+    /// Shifts of the pose by unknowns of the model: by the ranges' common errors, and by the part of the model's
+    /// size that the points leave unknown.
+    [[nodiscard]] PoseShifts shifts(const Observability& observability) const;
     /// Variance of the robust estimate over that of least squares with the configured noise: Huber's formula with
     /// his correction for few points. The sandwich estimator with one term per point was tried: where few points
     /// hold a motion its sigma was too small by a factor of 1.2 on a craft of 200,000 triangles.
@@ -62,8 +64,9 @@ private:
     Matrix6 hessian_ = Matrix6::Zero();      ///< sum of weight * J J' / sigma^2
     Vector6 gradient_ = Vector6::Zero();     ///< -sum of weight * J distance / sigma^2
     Matrix6 information_ = Matrix6::Zero();  ///< sum of J J' / sigma^2 of the points used
-    Vector6 by_range_ = Vector6::Zero();     ///< gradient per metre of range,
-    Vector6 by_scale_ = Vector6::Zero();     ///< and per unit of relative size
+    /// Gradients by the common errors, and per unit of relative size.
+    Eigen::Matrix<double, 6, 3> by_common_ = Eigen::Matrix<double, 6, 3>::Zero();
+    Vector6 by_scale_ = Vector6::Zero();
     bool size_is_known_ = true;
     double scale_hessian_ = 0, scale_gradient_ = 0;  ///< of the model's size, with its prior
     double scores2_ = 0, slopes_ = 0, slopes2_ = 0;  ///< sums of psi^2, psi', psi'^2 of the points used

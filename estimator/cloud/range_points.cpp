@@ -68,6 +68,9 @@ Status check_sweep(std::span<const RangePoint> points, std::span<const EmptyBeam
         if (!(points[i].range_m > 0 && std::isfinite(points[i].range_m)))
             return Error{
                 fmt::format("point {} of the sweep: expected a range > 0, not {:f} m", i, points[i].range_m)};
+        else if (!(points[i].sigma_m >= 0 && std::isfinite(points[i].sigma_m)))
+            return Error{fmt::format("point {} of the sweep: expected a standard deviation >= 0, not {:f} m", i,
+                                     points[i].sigma_m)};
     return Ok{};
 }
 

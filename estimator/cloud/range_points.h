@@ -1,6 +1,7 @@
 /// estimator/cloud/range_points.h - a LiDAR's sweep as measurements.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,6 +21,9 @@ struct RangePoint {
     Vec3 direction{};    ///< unit
     double range_m = 0;  ///< along the beam, > 0
     double t_s = 0;      ///< when it was fired, relative to the time of the pose
+    double sigma_m = 0;  ///< standard deviation of the range; 0: RangeNoise::range_m
+    /// Shifts of the range by one standard deviation of each error that all points of the sweep have in common.
+    std::array<double, 2> common_m{};
 
     [[nodiscard]] Vec3 position_m() const { return origin_m + range_m * direction; }
 };

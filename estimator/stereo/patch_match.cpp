@@ -2,62 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "estimator/pose/pose_estimate.h"
 
 namespace narpa {
-namespace {
-
-/// Turns n samples into the coefficients of the spline through them, in place.
-void filter(double* first, std::ptrdiff_t stride, int n) {
-    if (n < 2) return;
-    const double pole = std::sqrt(3.0) - 2;
-    const auto at = [=](int i) -> double& { return first[i * stride]; };
-    double start = 0, power = 1;  // of the causal part, the image mirrored before its first sample
-    for (int i = 0; i < std::min(n, 30); ++i, power *= pole) start += power * at(i);
-    at(0) = start;
-    for (int i = 1; i < n; ++i) at(i) += pole * at(i - 1);
-    at(n - 1) = pole / (pole * pole - 1) * (at(n - 1) + pole * at(n - 2));
-    for (int i = n - 2; i >= 0; --i) at(i) = pole * (at(i + 1) - at(i));
-    for (int i = 0; i < n; ++i) at(i) *= 6;
-}
-
-std::array<double, 4> weights(double t) {
-    const double s = 1 - t;
-    return {s * s * s / 6, 2.0 / 3 - t * t * (2 - t) / 2, 2.0 / 3 - s * s * (2 - s) / 2, t * t * t / 6};
-}
-std::array<double, 4> slopes(double t) {
-    const double s = 1 - t;
-    return {-s * s / 2, t * (1.5 * t - 2), -s * (1.5 * s - 2), t * t / 2};
-}
-
-}  // namespace
-
-SplineImage::SplineImage(const MeasuredImage& image)
-    : width_(image.width), height_(image.height), coefficients_(image.dn.begin(), image.dn.end()) {
-    for (int y = 0; y < height_; ++y) filter(coefficients_.data() + std::ptrdiff_t{y} * width_, 1, width_);
-    for (int x = 0; x < width_; ++x) filter(coefficients_.data() + x, width_, height_);
-}
-
-SplineImage::Sample SplineImage::sample(const Eigen::Vector2d& px) const {
-    const double x = std::floor(px.x()), y = std::floor(px.y());
-    const auto wx = weights(px.x() - x), wy = weights(px.y() - y);
-    const auto sx = slopes(px.x() - x), sy = slopes(px.y() - y);
-    const double* row = &coefficients_[(static_cast<std::size_t>(y) - 1) * static_cast<std::size_t>(width_) +
-                                       static_cast<std::size_t>(x) - 1];
-    Sample s;
-    for (std::size_t j = 0; j < 4; ++j, row += width_) {
-        const double value = wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3];
-        s.dn += wy[j] * value;
-        s.gradient.x() += wy[j] * (sx[0] * row[0] + sx[1] * row[1] + sx[2] * row[2] + sx[3] * row[3]);
-        s.gradient.y() += sy[j] * value;
-    }
-    return s;
-}
-
 EpipolarWarp::EpipolarWarp(const Pinhole& from, const Pinhole& to, const Rigid3& T_to_from)
     : t_(to_eigen(T_to_from.t)), to_(to) {
     const auto [origin, per_x, per_y] = from.rays(T_to_from.q);
@@ -83,13 +33,12 @@ constexpr double kSettled_px = 1e-4, kFarthest_px = 1.5;
 constexpr double kUnexplained_px = 0.06;
 /// How far ground that is not flat may move the image of a patch's edge, as craters of scenes/descent do.
 constexpr double kCurvature_px = 0.1;
-/// Low-pass filter before interpolation: weights of a pixel and its neighbours each way. It removes the frequencies
-/// that alias at a step between two pixels, and reduces the variance of noise to kSoftNoise.
-constexpr double kNeighbour = 0.125, kMiddle = 1 - 2 * kNeighbour;
-constexpr double kSoftNoise =
-    (kMiddle * kMiddle + 2 * kNeighbour * kNeighbour) * (kMiddle * kMiddle + 2 * kNeighbour * kNeighbour);
 /// Correlations that differ by less than this are the same.
 constexpr double kAlike = 1e-3;
+/// Along an epipolar line every so many pixels of a patch are compared each way; all of them where these correlate
+/// nearly as well as the best, to kNearlyBest.
+constexpr int kSearchStride = 2;
+constexpr double kNearlyBest = 0.1;
 /// Pixels above this part of the largest value count as saturated.
 constexpr double kFull = 0.98;
 
@@ -115,20 +64,27 @@ private:
     double n_ = 0, a_ = 0, b_ = 0, aa_ = 0, bb_ = 0, ab_ = 0;
 };
 
-/// Correlation of the patch with the other image, sampled where a camera-facing plane would appear, moved by
-/// `shift`.
+/// A place along an epipolar line.
+struct LinePlace {
+    Vector2d px;
+    double inverse_depth, correlation;
+};
+
+/// Correlation of the patch with the other image, sampled where a camera-facing plane would appear, at whole
+/// pixels. Of every `stride`-th pixel of it each way.
 std::optional<double> correlation(const Patch& patch, const EpipolarWarp& warp, const StereoView& there,
-                                  double inverse_depth, const Vector2d& shift) {
+                                  const LinePlace& at, int stride) {
     Correlation c;
-    const bool inside = for_each_pixel(patch, [&](const Vector2d& offset, double dn) {
-        const Vector3d ray = warp.ray(patch.centre_px() + offset);
-        if (!warp.is_before(ray, inverse_depth)) return false;
-        const Vector2d px = warp.px(ray, inverse_depth) + shift;
-        if (!there.spline.holds(px)) return false;
-        c.add(dn, there.spline.sample(px).dn);
-        return true;
-    });
-    if (!inside) return {};
+    const Vector2d shift = at.px - warp.px(warp.ray(patch.centre_px()), at.inverse_depth);
+    const int r = patch.radius_px, row = 2 * r + 1;
+    for (int y = -r; y <= r; y += stride)
+        for (int x = -r; x <= r; x += stride) {
+            const Vector3d ray = warp.ray(patch.centre_px() + Vector2d(x, y));
+            if (!warp.is_before(ray, at.inverse_depth)) return {};
+            const Vector2d px = warp.px(ray, at.inverse_depth) + shift;
+            if (!there.spline.holds(px)) return {};
+            c.add(patch.dn[static_cast<std::size_t>((y + r) * row + x + r)], there.spline.dn(px));
+        }
     return c.value();
 }
 
@@ -207,7 +163,7 @@ private:
 MeasuredImage softened(const MeasuredImage& image) {
     MeasuredImage out = image;
     cv::Mat pixels(image.height, image.width, CV_32F, out.dn.data());
-    const cv::Matx13d kernel(kNeighbour, kMiddle, kNeighbour);
+    const cv::Matx13d kernel(kSoftNeighbour, kSoftMiddle, kSoftNeighbour);
     cv::sepFilter2D(pixels, pixels, CV_32F, kernel, kernel, {-1, -1}, 0, cv::BORDER_REPLICATE);
     return out;
 }
@@ -232,11 +188,7 @@ bool cut_patch(const StereoView& view, int u, int v, int radius_px, Patch& patch
 
 std::optional<WholePixelMatch> search_line(const Patch& patch, const EpipolarWarp& warp, const StereoView& there,
                                            const InverseDepths& range) {
-    struct Candidate {
-        Vector2d px;
-        double inverse_depth, correlation;
-    };
-    std::vector<Candidate> candidates;
+    std::vector<LinePlace> candidates;
     const Vector3d ray = warp.ray(patch.centre_px());
     if (!warp.is_before(ray, range.low)) return {};
     const Vector2d first = warp.px(ray, range.low), along = warp.px_slope(ray, range.low);
@@ -250,14 +202,20 @@ std::optional<WholePixelMatch> search_line(const Patch& patch, const EpipolarWar
     for (double c = std::max(from, 0.0); c <= std::min(to, edge); ++c) {
         const Vector2d px = first + (c - first[axis]) / along[axis] * along;
         const double rho = std::clamp(warp.inverse_depth_at(ray, axis, c), range.low, range.high);
-        const Vector2d whole = px.array().round();
-        if (const auto match = correlation(patch, warp, there, rho, whole - warp.px(ray, rho)))
-            candidates.push_back({whole, rho, *match});
+        LinePlace place{px.array().round(), rho, 0};
+        if (const auto match = correlation(patch, warp, there, place, kSearchStride)) {
+            place.correlation = *match;
+            candidates.push_back(place);
+        }
     }
     if (candidates.empty()) return {};
-    const auto best = std::ranges::max_element(candidates, {}, &Candidate::correlation);
+    const double nearly =
+        std::ranges::max_element(candidates, {}, &LinePlace::correlation)->correlation - kNearlyBest;
+    for (LinePlace& c : candidates)
+        if (c.correlation >= nearly) c.correlation = correlation(patch, warp, there, c, 1).value_or(-1);
+    const auto best = std::ranges::max_element(candidates, {}, &LinePlace::correlation);
     double second = -1;
-    for (const Candidate& c : candidates)
+    for (const LinePlace& c : candidates)
         if ((c.px - best->px).lpNorm<Eigen::Infinity>() >= kApart_px) second = std::max(second, c.correlation);
     return WholePixelMatch{best->px, best->inverse_depth, best->correlation,
                            (1 - best->correlation + kAlike) / (1 - second + kAlike)};

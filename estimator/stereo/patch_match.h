@@ -7,32 +7,11 @@
 
 #include "base/pose.h"
 #include "estimator/pose/pose_estimate.h"
+#include "estimator/stereo/spline_image.h"
 #include "estimator/view/measured_image.h"
 #include "renderer/camera/scene_camera.h"
 
 namespace narpa {
-
-class SplineImage {
-public:
-    explicit SplineImage(const MeasuredImage& image);
-
-    struct Sample {
-        double dn = 0;
-        Eigen::Vector2d gradient{0, 0};  ///< DN per px
-    };
-    /// At a point for which holds() is true, else undefined.
-    [[nodiscard]] Sample sample(const Eigen::Vector2d& px) const;
-
-    static constexpr int kMargin_px = 2;
-    [[nodiscard]] bool holds(const Eigen::Vector2d& px) const {
-        return px.x() >= kMargin_px && px.y() >= kMargin_px && px.x() < width_ - 1 - kMargin_px &&
-               px.y() < height_ - 1 - kMargin_px;
-    }
-
-private:
-    int width_, height_;
-    std::vector<double> coefficients_;
-};
 
 class EpipolarWarp {
 public:
@@ -70,6 +49,12 @@ private:
     Eigen::Vector3d origin_, across_, down_, t_;
     Pinhole to_;
 };
+
+/// Low-pass filter before interpolation: weights of a pixel and its neighbours each way. It removes the frequencies
+/// that alias at a step between two pixels, and reduces the variance of noise to kSoftNoise.
+inline constexpr double kSoftNeighbour = 0.125, kSoftMiddle = 1 - 2 * kSoftNeighbour;
+inline constexpr double kSoftNoise = (kSoftMiddle * kSoftMiddle + 2 * kSoftNeighbour * kSoftNeighbour) *
+                                     (kSoftMiddle * kSoftMiddle + 2 * kSoftNeighbour * kSoftNeighbour);
 
 /// A camera's image, prepared for matching.
 struct StereoView {

@@ -2,7 +2,8 @@
 ///
 /// Corners of the left frame (Shi and Tomasi 1994) are searched along their epipolar lines in the right one, first
 /// to the whole pixel, as in the paper's section V, then to subpixels. A point is the centre of its corner's left
-/// pixel, so that the left pixel is exact and the error is the match's alone.
+/// pixel, so that the left pixel is exact and the error is the match's alone. In place of corners, the pixels of a
+/// grid can be matched, for a depth map.
 ///
 /// Errors of matches in scenes/descent (200 points, 500 x 500 pixels, detector noise of about a seventieth of the
 /// signal): 0.026 px along the epipolar line and 0.016 px across it, as predicted within a tenth; without noise
@@ -14,6 +15,7 @@
 /// outside them are not matched.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "estimator/stereo/patch_match.h"
@@ -21,9 +23,17 @@
 
 namespace narpa {
 
+/// Left camera's frame.
+struct StereoSphere {
+    Vec3 centre_m{};
+    double radius_m = 0;
+};
+
 struct StereoSettings {
     int points_max = 100;                  ///< the strongest corners that pass all checks
+    int grid_px = 0;                       ///< > 0: instead of corners, all pixels of a grid of this spacing
     double nearest_m = 0, farthest_m = 0;  ///< depths in the left frame between which points are searched
+    std::optional<StereoSphere> within{};  ///< points are also searched within this sphere only
     int patch_radius_px = 9;               ///< 2 .. 50; the smaller, the less relief and the more noise
 };
 
@@ -32,11 +42,17 @@ struct StereoPoint {
     WholePixelMatch whole;          ///< in the right frame
     SubPixelMatch match;            ///< in the right frame
     TriangulatedPoint point;        ///< from `match`
+    double range_m_per_px = 0;      ///< change of its range per shift of the match along the epipolar line
+
+    /// Standard deviation of its range: the error lies along the left pixel's ray.
+    [[nodiscard]] double range_sigma_m() const;
 };
 
 /// Number of corners by outcome.
 struct StereoCounts {
     int accepted = 0;
+    int outside = 0;       ///< its ray does not meet the sphere
+    int flat = 0;          ///< the patch has no contrast beyond noise
     int cut_off = 0;       ///< the patch, or all of its epipolar line, is outside a frame or saturated
     int unlike = 0;        ///< correlation below kMinCorrelation
     int ambiguous = 0;     ///< another place along the line correlates nearly as well
@@ -52,6 +68,10 @@ struct StereoPoints {
     StereoCounts counts;
 };
 
+/// "accepted 80, flat 12, ...": the outcomes that occurred.
+[[nodiscard]] std::string to_text(const StereoCounts& counts);
+
+/// In the order of the corners' strength, or of the grid's rows, on all threads of the calling thread's TBB arena.
 /// Errors: a frame that is not its camera's size, a pair that cannot be triangulated, depths that are no range.
 [[nodiscard]] Result<StereoPoints> match_stereo(const StereoPair& pair, const MeasuredImage& left,
                                                 const MeasuredImage& right, const StereoSettings& settings);

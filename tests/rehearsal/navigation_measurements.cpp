@@ -194,7 +194,7 @@ TEST(LidarPoseEstimator, GivesAReasonWithoutAPose) {
     const Plant plant = plant_at({15, 0, 0}, {});
     const MeasurementResult s = estimator.measure({}, 0, predicted(plant, chaser_target(plant)));
     EXPECT_FALSE(s.pose);
-    EXPECT_NE(s.why.find("returns meet the target"), std::string::npos) << s.why;
+    EXPECT_NE(s.why.find("points meet the target"), std::string::npos) << s.why;
 }
 
 TEST(SceneModel, TheEarthFollowsTheOrbit) {

@@ -395,10 +395,10 @@ TEST(IcpSweeps, TooFewPointsAreRefused) {
         EXPECT_EQ(e->answer.kind, AnswerKind::refused);
         EXPECT_NE(e->answer.why.find(why), std::string::npos) << e->answer.why;
     };
-    refuses({}, T, 0, "only 0 of 0 returns meet the target where it is taken to be, expected at least 6");
-    refuses({}, T, 1, "only 0 of 0 returns");
-    refuses(points, {T.q, -T.t}, 0, "returns meet the target");
-    refuses(std::span(points).first(5), T, 0, "of 5 returns meet the target");
+    refuses({}, T, 0, "only 0 of 0 points meet the target where it is taken to be, expected at least 6");
+    refuses({}, T, 1, "only 0 of 0 points");
+    refuses(points, {T.q, -T.t}, 0, "points meet the target");
+    refuses(std::span(points).first(5), T, 0, "of 5 points meet the target");
     refuses(std::span(points).first(20), T, 0, "expected 90 % with a confidence of 95 %: 29 or more if all do");
 }
 

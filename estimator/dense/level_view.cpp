@@ -286,12 +286,13 @@ std::vector<float> LevelView::indirect_light(const Rigid3& T_camera_target, Fram
     settings.method = RenderSettings::Method::path;
     view_.render_with_variance(T_camera_target, settings);
     const std::vector<float> both = rendered();
+    const bool dark_sky = render_scene_.scene().ambient == Rgb{};
     std::vector<float> indirect(direct.size());
     const auto width = static_cast<std::size_t>(window_.width);
     for (int y = 1; y < window_.height - 1; ++y)
         for (int x = 1; x < window_.width - 1; ++x) {
             const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
-            if (is_surrounded_by_light(direct, width, p)) indirect[p] = both[p] - direct[p];
+            if (dark_sky || is_surrounded_by_light(direct, width, p)) indirect[p] = both[p] - direct[p];
         }
     return indirect;
 }

@@ -38,9 +38,16 @@ Result<Rigid3> parse_pose(const std::string& numbers, const std::string& given) 
     return T;
 }
 
-std::string names_of_model_errors() {
+/// `told`: those that an estimator can be told.
+std::vector<ModelErrorName> model_errors(bool told) {
+    std::vector<ModelErrorName> out(kModelErrors.begin(), kModelErrors.end());
+    if (told) out.insert(out.end(), kToldErrors.begin(), kToldErrors.end());
+    return out;
+}
+
+std::string names_of_model_errors(bool told) {
     std::string names;
-    for (const ModelErrorName& n : kModelErrors) names += (names.empty() ? "" : ", ") + std::string(n.name);
+    for (const ModelErrorName& n : model_errors(told)) names += (names.empty() ? "" : ", ") + std::string(n.name);
     return names;
 }
 
@@ -153,6 +160,7 @@ Status PoseOptions::load(World& world, std::int64_t t_from_ns, std::int64_t t_to
 }
 
 Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::string& option, double* distortion) {
+    const std::vector<ModelErrorName> known = model_errors(!distortion);
     ModelUncertainty u;
     std::set<std::string> given;
     for (std::size_t from = 0; from < text.size();) {
@@ -161,11 +169,11 @@ Result<ModelUncertainty> model_uncertainty(const std::string& text, const std::s
         from = end + 1;
         const std::size_t equals = std::min(item.find('='), item.size());
         const std::string name = item.substr(0, equals);
-        const auto field = std::ranges::find(kModelErrors, name, &ModelErrorName::name);
+        const auto field = std::ranges::find(known, name, &ModelErrorName::name);
         const bool is_distortion = distortion && name == "distortion";
-        if (field == std::end(kModelErrors) && !is_distortion)
+        if (field == known.end() && !is_distortion)
             return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}{}", option, item,
-                                     names_of_model_errors(), distortion ? ", distortion" : "")};
+                                     names_of_model_errors(!distortion), distortion ? ", distortion" : "")};
         if (!given.insert(name).second) return Error{fmt::format("{}: {} is given twice", option, name)};
         double value = 0;
         const char* const last = item.data() + item.size();
@@ -201,7 +209,7 @@ void TrackerFlags::add_to(Parser app, const std::string& prefix) {
         .type_name("METRES")
         .range(1e-3, 1e9);
     app.option(dashes + "uncertainty", uncertainty,
-               "What is not exact in the scene, standard deviations: " + names_of_model_errors())
+               "What is not exact in the scene, standard deviations: " + names_of_model_errors(true))
         .type_name("NAME=VALUE,...");
     app.option(dashes + "frame-noise", tracker.frame_noise_dn,
                "With " + camera_methods_that_take_noise() +

@@ -119,8 +119,10 @@ LevelView& DenseAlignment::level(int factor, const Camera& camera, const Window&
 
 void DenseAlignment::evaluate_losses_on_common_pixels(const Measured& m, const DenseOptions& options,
                                                       DenseEstimate& a, DenseEstimate& b) {
-    if (a.window == b.window && a.sampling_factor == b.sampling_factor) return;
+    if (a.window == b.window && a.sampling_factor == b.sampling_factor && a.overconfidence == b.overconfidence)
+        return;
     a.sampling_factor = b.sampling_factor = std::min(a.sampling_factor, b.sampling_factor);
+    a.overconfidence = b.overconfidence = std::max(a.overconfidence, b.overconfidence);
     const Camera camera = coarser_camera(camera_, options.finest);
     const Window both = joined(a.window, b.window);
     LevelView& view = level(options.finest, camera, both, m, options);
@@ -146,9 +148,10 @@ Result<DenseEstimate> DenseAlignment::align(const MeasuredImage& frame, const Bo
         fit.guess_error = options.guess_error;
         const bool exact = options.model == ModelUncertainty{};
         fit.residual = e.residual;
-        fit.residual_max = !exact                   ? options.residual_max_model_inexact
-                           : frame_variance.empty() ? options.residual_max_noise_estimated
-                                                    : options.residual_max;
+        const bool inexact = !exact && options.model.detail == 0;
+        fit.residual_max = inexact                           ? options.residual_max_model_inexact
+                           : exact && frame_variance.empty() ? options.residual_max_noise_estimated
+                                                             : options.residual_max;
         if (options.rivals > 0) test_model(m, options, e, fit);
         if (options.rivals > 0 && fit.failed.empty() && fit.observability.unobserved > 0)
             keep_guess_where_unobserved(m, T_camera_body_guess, options, e, fit);
@@ -189,7 +192,8 @@ void DenseAlignment::test_by_mirrored_starts(const Measured& m, const Rigid3& gu
 
 /// True if steps from the other's coarse result lead to the answer. Adds the variance of the two to the covariance.
 bool DenseAlignment::converges_to(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options) {
-    other.exposure = e.exposure, other.sampling_factor = e.sampling_factor, other.renders = 0;
+    other.exposure = e.exposure, other.sampling_factor = e.sampling_factor;
+    other.overconfidence = e.overconfidence, other.renders = 0;
     const Camera camera = coarser_camera(camera_, options.finest);
     LevelView& finest = *levels_[level_number(options.finest)];
     LevelSolver solver(camera, render_scene_, target_, options.finest, finest, options, other);

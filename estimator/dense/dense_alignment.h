@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "base/result.h"
@@ -50,8 +51,8 @@ struct DenseOptions {
     /// early, from both sides. If the answer is far from the guess, the guess without the coarsest levels must not
     /// lead to a better one.
     int rivals = 2;
-    /// Largest accepted residual (DenseEstimate::residual): if the model is exact and the frame's noise given; if
-    /// its noise is estimated; if the model is not exact.
+    /// Largest accepted residual (DenseEstimate::residual): if the model is exact and the frame's noise given, or
+    /// the size of the details that are lacking is told; if the noise is estimated; if the model is not exact.
     double residual_max = 1.15, residual_max_noise_estimated = 1.3, residual_max_model_inexact = 6;
 };
 
@@ -78,9 +79,13 @@ struct DenseEstimate {
     int renders = 0;         ///< images compared with the frame
     double misfit = 0;       ///< loss beyond that of noise, per target pixel: Robustness{1, 3, 0}
     /// RMS residual over that expected from noise: of the target's pixels, or of those that determine the pose
-    /// (PhotometricEquations::residual), whichever is larger. If the frame's noise is estimated: of the latter with
-    /// Cauchy's weights, as some details smaller than a pixel have far more noise than stated.
+    /// (PhotometricEquations::residual), whichever is larger. If the frame's noise is estimated or details are
+    /// lacking: of the latter with Cauchy's weights, as some details smaller than a pixel have far more noise than
+    /// stated.
     double residual = 0;
+    /// Factor by which a chi-square of the residuals is too large, if they are not independent: where the model
+    /// lacks details; else 1.
+    double overconfidence = 1;
     double excess_loss = 0;  ///< loss beyond that of noise, sum over `window`, about a chi-square
     Window window{};         ///< of the last level
     /// PhotometricImages::sampling_factor with the samples of the last image; 1 if the frame's noise is known.
@@ -140,7 +145,7 @@ private:
     void test_by_start_near(const Measured& m, const Rigid3& guess, const DenseOptions& options, DenseEstimate& e,
                             Fit& fit);
     void test_model(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit);
-    static void solve_light(LevelSolver& solver, DenseEstimate& e);
+    [[nodiscard]] std::string solve_shown(LevelSolver& solver, bool lacks_details, DenseEstimate& e) const;
     void keep_guess_where_unobserved(const Measured& m, const Rigid3& guess, const DenseOptions& options,
                                      DenseEstimate& e, Fit& fit);
     void test_weak_motions(const Measured& m, const DenseOptions& options, DenseEstimate& e, Fit& fit);

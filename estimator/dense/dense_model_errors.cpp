@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "estimator/dense/dense_alignment.h"
@@ -25,6 +27,21 @@ bool turns_with_light(const Suspicion& s, const Matrix6& covariance) {
             normalised_error_squared(s.fit.shift, covariance) > kUntoldFar_chi2);
 }
 
+bool is_solved(const Suspect& suspect, bool lacks_details) {
+    return suspect.solved == Suspect::Solved::always ||
+           (suspect.solved == Suspect::Solved::if_details_lack && lacks_details);
+}
+
+/// Of a blur that the image's second derivative does not describe: the camera's own should be stated. Empty: none.
+std::string too_blurred(const Suspicion& s, const Camera& camera) {
+    if (s.suspect->most == 0) return {};
+    const double own_px = camera.optics.point_spread ? camera.optics.point_spread->sigma_px : 0;
+    const double more_px2 = std::max(std::abs(s.fit.amounts[0]), std::abs(s.fit.amounts[1]));
+    if (more_px2 <= s.suspect->most * (1 + own_px * own_px)) return {};
+    return fmt::format("{} It is about {:.2g} px, too large to be solved: state the camera's psf",
+                       s.suspect->sentence, std::sqrt(more_px2 + own_px * own_px));
+}
+
 /// Tests of the solver's linearisation, the most shown error first; `solved` are marked as such.
 std::vector<Suspicion> ordered_suspicions(LevelSolver& solver, std::span<const Suspect* const> solved) {
     std::vector<Suspicion> found = solver.suspicions();
@@ -38,6 +55,23 @@ const Suspicion* shown_by(const std::vector<Suspicion>& suspicions) {
     return !suspicions.empty() && suspicions.front().fit.sigmas > kUntold_sigmas ? &suspicions.front() : nullptr;
 }
 
+/// An error of the model that the residuals show and that moves the pose refuses it. Where the model is known to
+/// lack details, the shift is part of the covariance instead, up to a limit.
+void refuse_or_widen(const ModelUncertainty& model, const Suspicion* shown, DenseEstimate& e, Fit& fit) {
+    Matrix6 widened = e.covariance;
+    for (const Suspicion& s : e.suspicions) {
+        if (!refuses(s.fit.sigmas, s.fit.shift, e.covariance)) continue;
+        if (model.detail > 0 && normalised_error_squared(s.fit.shift, e.covariance) < kWidenedShift_chi2) {
+            widened += s.fit.shift * s.fit.shift.transpose();
+        } else if (fit.failed.empty()) {
+            // Errors resemble each other: the one that the residuals show most is named, whichever moves the pose.
+            const Suspicion& named = shown ? *shown : e.suspicions.front();
+            fit.failed = why_untold(named.suspect->sentence, named.fit.sigmas, s.fit.shift, e.covariance);
+        }
+    }
+    e.covariance = widened;
+}
+
 }  // namespace
 
 /// Tests for errors of the model that no uncertainty states. Those of the light are solved with the pose. Of an
@@ -49,14 +83,15 @@ void DenseAlignment::test_model(const Measured& m, const DenseOptions& options, 
     LevelView& view = level(options.finest, camera, *window, m, options);
     LevelSolver solver(camera, render_scene_, target_, options.finest, view, options, e);
     solver.linearise_with_many_samples();
-    if (has_independent_noise()) e.suspicions = ordered_suspicions(solver, {});
+    if (has_independent_noise() || options.model.detail > 0) e.suspicions = ordered_suspicions(solver, {});
     const std::vector<Suspicion> before = e.suspicions;
     const Suspicion* shown = shown_by(before);
     if (!fit.failed.empty()) {
         if (shown) fit.failed += fmt::format("; {}", shown->suspect->sentence);
         return;
     }
-    solve_light(solver, e);
+    fit.failed = solve_shown(solver, options.model.detail > 0, e);
+    if (!fit.failed.empty()) return;
     fit.residual = e.residual;
     const Vector6 left = solver.remaining_step();
     e.covariance += left * left.transpose();
@@ -69,28 +104,27 @@ void DenseAlignment::test_model(const Measured& m, const DenseOptions& options, 
                         fit.residual_max, shown ? "; " : "", shown ? shown->suspect->sentence : "");
         return;
     }
-    // Errors resemble each other: the one that the residuals show most is named, whichever moves the pose.
-    for (const Suspicion& s : e.suspicions)
-        if (fit.failed.empty() && refuses(s.fit.sigmas, s.fit.shift, e.covariance)) {
-            const Suspicion& named = shown ? *shown : e.suspicions.front();
-            fit.failed = why_untold(named.suspect->sentence, named.fit.sigmas, s.fit.shift, e.covariance);
-        }
+    refuse_or_widen(options.model, shown, e, fit);
+    observe(e.T_camera_body, e.covariance, fit);
 }
 
-/// As long as an error of the light is the one that the residuals show most: adds it to the prediction.
-void DenseAlignment::solve_light(LevelSolver& solver, DenseEstimate& e) {
+/// As long as the error that the residuals show most can be solved: adds it to the prediction.
+/// Returns why there is no pose; empty: none.
+std::string DenseAlignment::solve_shown(LevelSolver& solver, bool lacks_details, DenseEstimate& e) const {
     if (std::ranges::any_of(e.suspicions, [&](const Suspicion& s) { return turns_with_light(s, e.covariance); }))
-        return;
+        return {};
     std::vector<const Suspect*> solved;
     for (int k = 0; k < kLightsSolved; ++k) {
         const Suspicion* worst = shown_by(e.suspicions);
-        if (!worst || !worst->suspect->is_light) return;
+        if (!worst || !is_solved(*worst->suspect, lacks_details)) return {};
+        if (std::string why = too_blurred(*worst, camera_); !why.empty()) return why;
         solved.push_back(worst->suspect);
         solver.solve(*worst);
         solver.linearise_with_many_samples();
         e.suspicions = ordered_suspicions(solver, solved);
         e.residual = solver.residual();
     }
+    return {};
 }
 
 /// Steps along the observed motions follow, as these are not independent of the others over the guess's error.

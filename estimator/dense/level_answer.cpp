@@ -26,8 +26,9 @@ void LevelSolver::finish() {
                     : static_cast<std::size_t>(std::ranges::count_if(images.chosen, [](auto c) { return c != 0; }));
     const PhotometricCost loss = cost(images, e_.exposure, {});
     e_.window = view_.window();
-    e_.excess_loss = loss.excess();
-    e_.misfit = e_.excess_loss / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
+    if (o_.model.detail > 0) e_.overconfidence = last.overconfidence();
+    e_.excess_loss = loss.excess() / e_.overconfidence;
+    e_.misfit = loss.excess() / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
     e_.residual = residual();
     const double off = std::abs(e_.exposure.gain - 1);
     if (off > kPriorSigmas * images.prior.gain_sigma + kGainOffMin)
@@ -39,7 +40,7 @@ void LevelSolver::finish() {
 
 double LevelSolver::residual() const {
     const PhotometricImages now = images();
-    if (now.measured_variance.empty() && o_.model == ModelUncertainty{})
+    if ((now.measured_variance.empty() && o_.model == ModelUncertainty{}) || o_.model.detail > 0)
         return equations(now, e_.exposure, {1, kResidualCauchy, 0}).residual() / kResidualOfNormal;
     const double of_information =
         equations(now, e_.exposure, {1, std::numeric_limits<double>::infinity(), 0}).residual();
@@ -80,7 +81,8 @@ LevelSolver::Rise LevelSolver::rise(int motions, double sigmas) {
             const Eigen::Vector2d step = equations_.exposure_step(motion);
             const Exposure exposure{e_.exposure.gain + step[0], e_.exposure.offset_dn + step[1]};
             render(displaced(e_.T_camera_body, motion));
-            const double rises = (cost(images(), exposure, {}).robust - loss_when_linearised_) / (sigmas * sigmas);
+            const double rises = (cost(images(), exposure, {}).robust - loss_when_linearised_) /
+                                 (e_.overconfidence * sigmas * sigmas);
             rise = {std::min(rise.min, rises), std::max(rise.max, rises)};
         }
     return rise;

@@ -169,7 +169,8 @@ std::optional<Vector6> LevelSolver::distance_after_steps_to(const Rigid3& T_came
         if (!linearise()) return {};
         e_.T_camera_body = displaced(e_.T_camera_body, next_step(kDampingMin).pose);
         left = error_between(e_.T_camera_body, T_camera_body);
-        const Matrix6 information = equations_.pose_information() / (robust_.scale * robust_.scale);
+        const Matrix6 information =
+            equations_.pose_information() / std::max(robust_.scale * robust_.scale, e_.overconfidence);
         const double most =
             std::max(kSameMinimum_chi2, kSameMinimumPart * kSameMinimumPart * way.dot(information * way));
         if (!(left.dot(information * left) < most)) return {};
@@ -183,7 +184,7 @@ void LevelSolver::evaluate_loss() {
     render(e_.T_camera_body);
     ++e_.renders;
     e_.window = view_.window();
-    e_.excess_loss = cost(images(), e_.exposure, {}).excess();
+    e_.excess_loss = cost(images(), e_.exposure, {}).excess() / e_.overconfidence;
 }
 
 void LevelSolver::linearise_with_many_samples() {
@@ -211,7 +212,8 @@ void LevelSolver::measure_noise() {
 std::vector<Suspicion> LevelSolver::suspicions() {
     const PhotometricImages now = images();
     const FrameSettings few = settings_of_suspects();
-    return narpa::suspicions({view_, now, e_.T_camera_body, few, o_.model}, e_.exposure, robust_);
+    return narpa::suspicions({view_, now, e_.T_camera_body, few, o_.model, pixels_per_radian_}, e_.exposure,
+                             robust_, e_.overconfidence);
 }
 
 FrameSettings LevelSolver::settings_of_suspects() const {
@@ -223,7 +225,8 @@ FrameSettings LevelSolver::settings_of_suspects() const {
 void LevelSolver::solve(const Suspicion& s) {
     const PhotometricImages now = images();
     const FrameSettings few = settings_of_suspects();
-    const NuisanceColumns columns = s.suspect->columns({view_, now, e_.T_camera_body, few, o_.model});
+    const NuisanceColumns columns =
+        s.suspect->columns({view_, now, e_.T_camera_body, few, o_.model, pixels_per_radian_});
     std::vector<float> light(now.signal.size());
     for (std::size_t i = 0; i < columns.size(); ++i)
         for (std::size_t p = 0; p < light.size(); ++p)

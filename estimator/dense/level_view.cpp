@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/constants.h"
+#include "estimator/least_squares/median.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/integrator/shading.h"
 
@@ -50,6 +51,21 @@ Interval rounded(double low_px, double high_px, int size) {
     const double last = kRounding_px * std::ceil((high_px + room) / kRounding_px);
     const int begin = static_cast<int>(limit(first));
     return {begin, static_cast<int>(limit(last)) - begin};
+}
+
+/// True if one of the pixel's neighbours is lit.
+bool is_beside_light(const std::vector<float>& signal, std::size_t width, std::size_t p) {
+    for (const std::size_t middle : {p - width, p, p + width})
+        for (const std::size_t q : {middle - 1, middle, middle + 1})
+            if (signal[q] > 0) return true;
+    return false;
+}
+/// True if the pixel and its neighbours are lit: it does not show the sky, which is light of method path alone.
+bool is_surrounded_by_light(const std::vector<float>& signal, std::size_t width, std::size_t p) {
+    for (const std::size_t middle : {p - width, p, p + width})
+        for (const std::size_t q : {middle - 1, middle, middle + 1})
+            if (!(signal[q] > 0)) return false;
+    return true;
 }
 
 }  // namespace
@@ -106,6 +122,8 @@ void LevelView::begin_frame(const BodyPoses& at, const ApparentMotion& motion, c
     differentiated_at_.reset();
     chosen_.clear();
     added_.clear();
+    detail_dn2_ = 0;
+    ignored_.clear();
     at_ = at, motion_ = motion, times_ = times.from(window_.y), model_ = model, T_world_camera_ = T_world_camera;
     view_.begin_frame(at_, motion_, times_);
     derivative_.begin_frame(at_, motion_, times_);
@@ -146,6 +164,7 @@ void LevelView::render(const Rigid3& T_camera_target, const FrameSettings& setti
             static_cast<float>(sensor_.signal(view_.radiance().pixels[i])) + (added_.empty() ? 0 : added_[i]);
         signal_variance_[i] = static_cast<float>(per_mean_band * per_mean_band) * view_.aovs().variance[i];
     }
+    if (model_.detail > 0 && detail_dn2_ == 0) detail_dn2_ = model_.detail * model_.detail * signal_power(images());
 }
 
 void LevelView::add_light(std::span<const float> signal) {
@@ -266,8 +285,15 @@ std::vector<float> LevelView::indirect_light(const Rigid3& T_camera_target, Fram
     const std::vector<float> direct = rendered();
     settings.method = RenderSettings::Method::path;
     view_.render_with_variance(T_camera_target, settings);
-    std::vector<float> indirect = rendered();
-    for (std::size_t p = 0; p < direct.size(); ++p) indirect[p] -= direct[p];
+    const std::vector<float> both = rendered();
+    const bool dark_sky = render_scene_.scene().ambient == Rgb{};
+    std::vector<float> indirect(direct.size());
+    const auto width = static_cast<std::size_t>(window_.width);
+    for (int y = 1; y < window_.height - 1; ++y)
+        for (int x = 1; x < window_.width - 1; ++x) {
+            const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            if (dark_sky || is_surrounded_by_light(direct, width, p)) indirect[p] = both[p] - direct[p];
+        }
     return indirect;
 }
 
@@ -277,6 +303,27 @@ void LevelView::differentiate(const Rigid3& T_camera_target, const FrameSettings
     columns_.assign(all.begin(), all.end());
     differentiated_at_ = T_camera_target, fineness_ = fineness;
     if (T_world_camera_) add_shading(T_camera_target, settings);
+    if (model_.detail > 0) find_clutter();
+}
+
+/// A target in front of clutter, which the scene lacks: its outline's brightness steps are not those of the model,
+/// so pixels beside the sky are ignored. There is clutter if half of them are brighter or darker than the sky by
+/// more than the details that the model lacks.
+void LevelView::find_clutter() {
+    const auto width = static_cast<std::size_t>(window_.width);
+    std::vector<std::uint8_t> beside_sky(signal_.size());
+    std::vector<float> off_dn;
+    for (int y = 1; y < window_.height - 1; ++y)
+        for (int x = 1; x < window_.width - 1; ++x) {
+            const std::size_t p = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            if (is_surrounded_by_light(signal_, width, p)) continue;
+            beside_sky[p] = 1;
+            if (!(signal_[p] > 0) && is_beside_light(signal_, width, p))
+                off_dn.push_back(std::abs(measured_[p] - static_cast<float>(sensor_.black_dn)));
+        }
+    const bool clutter =
+        !off_dn.empty() && upper_median(std::span(off_dn)) > static_cast<float>(std::sqrt(detail_dn2_));
+    ignored_ = clutter ? std::move(beside_sky) : std::vector<std::uint8_t>{};
 }
 
 /// Mask: not 0 where a chosen pixel or one of its neighbours is lit.
@@ -344,10 +391,13 @@ PhotometricImages LevelView::images() const {
             .signal_variance = signal_variance_,
             .derivative = columns_,
             .pixels_averaged = pixels_averaged_,
-            .prior = {.gain_sigma = std::hypot(ExposurePrior{}.gain_sigma, model_.albedo)},
+            .prior = {.gain_sigma = std::hypot(ExposurePrior{}.gain_sigma, model_.albedo),
+                      .offset_sigma_dn = std::hypot(ExposurePrior{}.offset_sigma_dn, std::sqrt(detail_dn2_))},
             .measured_clipped = measured_clipped_,
             .chosen = chosen_,
-            .model_part = model_.light_rad};
+            .ignored = ignored_,
+            .model_part = model_.light_rad,
+            .detail_dn2 = detail_dn2_};
 }
 
 }  // namespace narpa

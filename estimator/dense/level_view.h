@@ -67,7 +67,8 @@ public:
     /// DN of the target in light that falls on all of its surfaces alike; the brightest is 1. At the latest
     /// render's pose.
     [[nodiscard]] std::vector<float> ambient_light() const;
-    /// DN of the light that the target's surfaces reflect to each other, by renders with these settings.
+    /// DN of the light that the target's surfaces reflect to each other, by renders with these settings. With ambient
+    /// light, which method path shows as a sky: none in pixels beside dark ones.
     [[nodiscard]] std::vector<float> indirect_light(const Rigid3& T_camera_target, FrameSettings settings);
     /// At the pose of the latest render, for lit pixels.
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);
@@ -86,6 +87,7 @@ private:
     [[nodiscard]] std::vector<std::uint8_t> lit() const;
     /// DN above black of view_'s latest image.
     [[nodiscard]] std::vector<float> rendered() const;
+    void find_clutter();
     void add_shading(const Rigid3& T_camera_target, const FrameSettings& settings);
 
     const SensorModel& sensor_;
@@ -101,7 +103,9 @@ private:
     ModelView view_;
     ImageDerivative derivative_;
     std::vector<float> measured_, measured_variance_, signal_, signal_variance_;
-    std::vector<float> added_;  ///< add_light; empty: none
+    std::vector<float> added_;           ///< add_light; empty: none
+    std::vector<std::uint8_t> ignored_;  ///< find_clutter; empty: none
+    double detail_dn2_ = 0;              ///< by the brightness of this frame's first render
     std::vector<std::uint8_t> measured_clipped_;
     std::vector<PixelDerivative> columns_;
     std::vector<std::uint8_t> chosen_;  ///< empty: all

@@ -35,19 +35,20 @@ NuisanceColumns rows_moved(const SuspectScene& s) {
     return rows_of_motion(s, 0, 6);
 }
 
-/// Second derivatives of the image along both axes and across: motion or defocus. From the derivative by the pose,
-/// whose noise is not that of the residuals.
+/// Half of the image's second derivatives along both axes and across: motion or defocus. The amounts of the first
+/// two are variances of the blur, px^2. From the derivative by the pose, whose noise is not that of the residuals.
 NuisanceColumns wider_edges(const SuspectScene& s) {
     NuisanceColumns columns(3, Column(s.images.signal.size()));
     const auto& J = s.images.derivative;
     constexpr int kRight = 3, kDown = 4;  // translations
+    const auto unit = static_cast<float>(0.25 * s.T_camera_target.t.z / s.pixels_per_radian);
     for (int y = 1; y < s.images.height - 1; ++y)
         for (int x = 1; x < s.images.width - 1; ++x) {
             const std::size_t p = index_in(s.images.width, x, y);
             const auto width = static_cast<std::size_t>(s.images.width);
-            columns[0][p] = J[p - 1][kRight] - J[p + 1][kRight];
-            columns[1][p] = J[p - width][kDown] - J[p + width][kDown];
-            columns[2][p] = J[p - width][kRight] - J[p + width][kRight];
+            columns[0][p] = unit * (J[p - 1][kRight] - J[p + 1][kRight]);
+            columns[1][p] = unit * (J[p - width][kDown] - J[p + width][kDown]);
+            columns[2][p] = unit * (J[p - width][kRight] - J[p + width][kRight]);
         }
     return columns;
 }
@@ -84,17 +85,21 @@ NuisanceColumns interreflection(const SuspectScene& s) {
 /// rotation's largest standard deviation, so that the roll counts as observed.
 constexpr double kUntoldLight_rad = 0.5 * kMaxRotation_rad;
 
+/// The second derivative describes a blur of about a pixel.
+constexpr double kMostBlur_px2 = 2;
+
+using Solved = Suspect::Solved;
 constexpr std::array<Suspect, 7> kSuspects{{
-    {"rows", kProgressiveRows, 0, false, rows_shifted},
-    {"rows of a motion", kProgressiveRows, 0, false, rows_moved},
-    {"blur", "edges are wider or sharper than the model's: motion during the exposure, or defocus?", 0, false,
-     wider_edges},
-    {"light", "surfaces are lit from elsewhere: another direction of the light?", kUntoldLight_rad, true,
-     turned_light},
-    {"ambient", "surfaces have more or less light than the model's everywhere: ambient light?", 0, true,
-     ambient_light},
-    {"gain", "the gain changes across the image: vignetting?", 0, true, gain_gradient},
-    {"indirect", "surfaces light each other: interreflection, method path?", 0, true, interreflection},
+    {"rows", kProgressiveRows, 0, Solved::never, 0, rows_shifted},
+    {"rows of a motion", kProgressiveRows, 0, Solved::never, 0, rows_moved},
+    {"blur", "edges are wider or sharper than the model's: motion during the exposure, or defocus?", 0,
+     Solved::if_details_lack, kMostBlur_px2, wider_edges},
+    {"light", "surfaces are lit from elsewhere: another direction of the light?", kUntoldLight_rad, Solved::always,
+     0, turned_light},
+    {"ambient", "surfaces have more or less light than the model's everywhere: ambient light?", 0, Solved::always,
+     0, ambient_light},
+    {"gain", "the gain changes across the image: vignetting?", 0, Solved::always, 0, gain_gradient},
+    {"indirect", "surfaces light each other: interreflection, method path?", 0, Solved::always, 0, interreflection},
 }};
 
 }  // namespace
@@ -103,12 +108,15 @@ std::span<const Suspect> model_suspects() noexcept {
     return kSuspects;
 }
 
-std::vector<Suspicion> suspicions(const SuspectScene& scene, const Exposure& exposure, const Robustness& robust) {
+std::vector<Suspicion> suspicions(const SuspectScene& scene, const Exposure& exposure, const Robustness& robust,
+                                  double overconfidence) {
     std::vector<Suspicion> out;
     for (const Suspect& suspect : kSuspects) {
         const NuisanceColumns columns = suspect.columns(scene);
         if (columns.empty()) continue;
-        out.push_back({&suspect, fit_nuisance(scene.images, exposure, robust, columns, suspect.prior), false});
+        out.push_back({&suspect,
+                       fit_nuisance(scene.images, exposure, robust, columns, suspect.prior, overconfidence),
+                       false});
     }
     return out;
 }

@@ -18,6 +18,7 @@ struct SuspectScene {
     const Rigid3& T_camera_target;
     const FrameSettings& settings;
     const ModelUncertainty& model;
+    double pixels_per_radian;
 };
 
 /// An error of the model that no uncertainty states.
@@ -27,7 +28,11 @@ struct Suspect {
     /// Standard deviation of an error that is not told, if the answer is widened by it where the frame cannot test
     /// it (NuisanceFit::covariance); 0: none.
     double prior;
-    bool is_light;  ///< changes the pixels' light only: it can be solved with the pose
+    /// Whether it can be solved with the pose: always, as it changes the pixels' light only; if the model is known
+    /// to lack details, as its column is an approximation; or never.
+    enum class Solved : std::uint8_t { never, if_details_lack, always } solved;
+    /// Largest amount for which its columns are valid, beside as much of the camera's own blur; 0: any.
+    double most;
     /// Empty where there can be no such error.
     NuisanceColumns (*columns)(const SuspectScene& scene);
 };
@@ -41,8 +46,8 @@ struct Suspicion {
     bool solved = false;  ///< added to the prediction, with the amounts of an earlier test
 };
 
-/// Tests all of them.
+/// Tests all of them. `overconfidence`: DenseEstimate.
 [[nodiscard]] std::vector<Suspicion> suspicions(const SuspectScene& scene, const Exposure& exposure,
-                                                const Robustness& robust);
+                                                const Robustness& robust, double overconfidence);
 
 }  // namespace narpa

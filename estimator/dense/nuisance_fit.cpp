@@ -80,7 +80,13 @@ public:
         return sums;
     }
     /// Covariance of the gradient in the basis `to` of the unknowns, after the step.
-    [[nodiscard]] MatrixN scatter(const MatrixN& to, const MatrixN& inverse, const VectorN& step) const {
+    [[nodiscard]] MatrixN scatter(const MatrixN& to, const MatrixN& information, const MatrixN& inverse,
+                                  const VectorN& step) const {
+        if (images_.detail_dn2 > 0)
+            return scatter_of_blocks(images_, residuals_, information, [&](const PixelResidual& r, std::size_t p) {
+                const VectorN x = to.transpose() * at(r, p);
+                return FitRow<VectorN>{x, cauchy_weight(r.r, k_), r.r - x.dot(step)};
+            });
         const Eigen::Index n = to.cols();
         NuisanceSums sums = sum_rows(images_, NuisanceSums::zero(n), [&](int y, NuisanceSums& row) {
             residuals_.each(y, [&](const PixelResidual& r, std::size_t p) {
@@ -143,13 +149,13 @@ struct Left {
     }
     /// Added covariance of the pose: its response to the unknowns, times their variance by residuals and prior. 0:
     /// no prior, and none of the unknowns that residuals do not show.
-    [[nodiscard]] Matrix6 covariance(double prior) const {
+    [[nodiscard]] Matrix6 covariance(double prior, double overconfidence) const {
         Matrix6 sum = Matrix6::Zero();
         for (Eigen::Index i = 0; i < values.size(); ++i) {
             const VectorN unknowns = unit.asDiagonal() * vectors.col(i);
             if (unknowns.isZero(0)) continue;
             const Vector6 pose = response.topRows(6) * unknowns;
-            const double by_residuals = std::max(values[i] - kLeastLeft, 0.0);
+            const double by_residuals = std::max(values[i] - kLeastLeft, 0.0) / overconfidence;
             const double by_prior = prior > 0 ? unknowns.squaredNorm() / (prior * prior) : 0;
             if (by_residuals + by_prior > 0) sum += pose * pose.transpose() / (by_residuals + by_prior);
         }
@@ -160,16 +166,16 @@ struct Left {
 }  // namespace
 
 NuisanceFit fit_nuisance(const PhotometricImages& images, const Exposure& exposure, const Robustness& robust,
-                         const NuisanceColumns& columns, double prior) {
+                         const NuisanceColumns& columns, double prior, double overconfidence) {
     assert(!columns.empty() && columns.size() <= static_cast<std::size_t>(kMostUnknowns - kPoseAndExposure));
     const NuisanceEquations fit(images, exposure, robust, columns);
     const NuisanceSums sums = fit.equations();
     NuisanceFit out;
     const Left left(sums.information);
-    if (prior > 0) out.covariance = left.covariance(prior);
+    if (prior > 0) out.covariance = left.covariance(prior, overconfidence);
     out.rotation_response = left.response.topRows(3).norm();
     constexpr double kNoPrior = 100;  // times the prior: what residuals do not show is then not observed
-    out.covariance_without_prior = left.covariance(kNoPrior * prior);
+    out.covariance_without_prior = left.covariance(kNoPrior * prior, overconfidence);
     const MatrixN kept = left.determined();
     out.unknowns = static_cast<int>(kept.cols());
     if (out.unknowns == 0) return out;
@@ -180,7 +186,7 @@ NuisanceFit fit_nuisance(const PhotometricImages& images, const Exposure& exposu
     const MatrixN information = to.transpose() * sums.information * to;
     const MatrixN inverse = information.ldlt().solve(MatrixN::Identity(n, n));
     const VectorN step = inverse * (to.transpose() * sums.gradient);
-    const MatrixN covariance = inverse * fit.scatter(to, inverse, step) * inverse;
+    const MatrixN covariance = inverse * fit.scatter(to, information, inverse, step) * inverse;
     const VectorN amount = step.tail(kept.cols());
     const MatrixN of_amount = covariance.bottomRightCorner(kept.cols(), kept.cols());
     out.sigmas = as_normal(amount.dot(of_amount.ldlt().solve(amount)), static_cast<double>(kept.cols()));

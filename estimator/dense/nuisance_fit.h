@@ -34,7 +34,9 @@ struct NuisanceFit {
 };
 
 /// `prior`: standard deviation of each unknown for NuisanceFit::covariance, in the units of its column.
+/// `overconfidence`: DenseEstimate.
 [[nodiscard]] NuisanceFit fit_nuisance(const PhotometricImages& images, const Exposure& exposure,
-                                       const Robustness& robust, const NuisanceColumns& columns, double prior);
+                                       const Robustness& robust, const NuisanceColumns& columns, double prior,
+                                       double overconfidence);
 
 }  // namespace narpa

@@ -35,27 +35,6 @@ void add_square(Matrix8& sum, const Vector8& J, double weight, int first) {
     }
 }
 
-/// Sums over blocks of kBlock_px x kBlock_px pixels. k: scale of Cauchy's loss.
-Matrix8 scatter_of_blocks(const PhotometricImages& images, const PixelResiduals& residuals, double k) {
-    constexpr int kBlock_px = 8;
-    const auto across = static_cast<std::size_t>(images.width / kBlock_px + 1);
-    std::vector<Matrix8> rows(static_cast<std::size_t>(images.height / kBlock_px + 1), Matrix8::Zero());
-    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t row) {
-        std::vector<Vector8> pulls(across, Vector8::Zero());
-        const int first = static_cast<int>(row) * kBlock_px;
-        for (int y = std::max(1, first); y < std::min(first + kBlock_px, images.height - 1); ++y)
-            residuals.each(y, [&](const PixelResidual& r, std::size_t p) {
-                const double weight = cauchy_weight(r.r, k);
-                const std::size_t x = p % static_cast<std::size_t>(images.width);
-                pulls[x / kBlock_px] += weight * r.r * r.inverse_s * design(images, residuals.exposure(), p);
-            });
-        for (const Vector8& pull : pulls) rows[row] += pull * pull.transpose();
-    });
-    Matrix8 sum = Matrix8::Zero();
-    for (const Matrix8& row : rows) sum += row;
-    return sum;
-}
-
 }  // namespace
 
 PhotometricCost& PhotometricCost::operator+=(const PhotometricCost& b) {
@@ -159,7 +138,11 @@ void add_scatter(const PhotometricImages& images, const PixelResiduals& residual
         });
     });
     out.scatter = Matrix8(sum.scatter.selfadjointView<Eigen::Lower>());
-    out.block_scatter = scatter_of_blocks(images, residuals, k);
+    out.block_scatter =
+        scatter_of_blocks(images, residuals, out.information, [&](const PixelResidual& r, std::size_t p) {
+            return FitRow<Vector8>{r.inverse_s * design(images, residuals.exposure(), p), cauchy_weight(r.r, k),
+                                   r.r};
+        });
     if (sum.leverage > 0) out.curvature = std::max(sum.curvature / sum.leverage, kLeastCurvature);
 }
 
@@ -202,10 +185,16 @@ Matrix6 PhotometricEquations::pose_covariance() const {
     const Matrix8& larger =
         (inverse * block_scatter).trace() > (inverse * scatter).trace() ? block_scatter : scatter;
     const double per_information = 1 / (curvature * curvature);
-    const bool as_expected = per_information * (inverse * larger).trace() <= 8;
+    const bool as_expected = overconfidence() == 1;
     const Matrix6 C =
         (as_expected ? inverse : Matrix8(per_information * inverse * larger * inverse)).topLeftCorner<6, 6>();
     return 0.5 * (C + C.transpose());  // removes asymmetry due to rounding
+}
+
+double PhotometricEquations::overconfidence() const {
+    const Matrix8 inverse = information.inverse();
+    const double larger = std::max((inverse * block_scatter).trace(), (inverse * scatter).trace());
+    return std::max(1.0, larger / (8 * curvature * curvature));
 }
 
 double PhotometricEquations::residual() const {

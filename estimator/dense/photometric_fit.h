@@ -43,10 +43,14 @@ struct PhotometricImages {
     /// Mask: not 0 for the pixels that determine the pose (informative_pixels). The others have no derivative and
     /// fewer samples; gain, offset and the residuals' scale use all. Empty: all.
     std::span<const std::uint8_t> chosen{};
+    /// Mask: not 0 for pixels that are not compared. Empty: none.
+    std::span<const std::uint8_t> ignored{};
     /// Sampling variance of prediction and frame over `signal_variance`: 1 where the frame's is in
     /// `measured_variance` (sampling_noise.h).
     double sampling_factor = 1;
     double model_part = 0;  ///< standard deviation of the prediction's model error, as a part of the signal
+    /// Variance of the details that the model lacks, which neighbouring pixels share, in all pixels; 0: none.
+    double detail_dn2 = 0;
 };
 
 struct PhotometricCost {
@@ -83,7 +87,8 @@ struct PhotometricEquations {
     Eigen::Matrix<double, 8, 8> information = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 1> gradient = Eigen::Matrix<double, 8, 1>::Zero();
     /// Empirical covariance of the gradient, from the residuals, plus the prior: for independent pixels, and for
-    /// blocks of pixels whose residuals share a model error.
+    /// blocks of pixels whose residuals share a model error: of 8 x 8, or of the size that makes it largest if the
+    /// model lacks details.
     Eigen::Matrix<double, 8, 8> scatter = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 8> block_scatter = Eigen::Matrix<double, 8, 8>::Zero();
     /// Mean second derivative of the loss over its weight, as the pixels determine the pose: the gradient changes
@@ -96,6 +101,8 @@ struct PhotometricEquations {
     /// True if the least eigenvalue of the pose's information, scaled to a unit diagonal, is above rounding.
     [[nodiscard]] bool observes_pose() const;
     [[nodiscard]] Vector6 pose_gradient() const;
+    /// Variance of the pose over that of the inverse information, mean of all unknowns; at least 1.
+    [[nodiscard]] double overconfidence() const;
     /// Inverse information where residuals are no larger than their noise; else the sandwich estimator (P. J.
     /// Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 5th Berkeley Symposium,
     /// 1967), of independent pixels or of blocks (K.-Y. Liang, S. Zeger, Biometrika 73, 1986), whichever is larger,

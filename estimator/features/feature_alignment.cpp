@@ -24,9 +24,6 @@ constexpr double kNeighbour_px = 1.5;
 /// off its tangent plane by at most this many pixels' worth of depth: a bend is a corner, a step is an outline.
 constexpr double kStep_px = 6;
 
-/// Progressive rows that move the pose by up to eight standard deviations enlarge its covariance by the shift;
-/// others refuse it. Photographs of a chessboard by a webcam are moved by two to seven.
-constexpr double kWidenedShift_chi2 = 64;
 /// With fewer degrees of freedom the residuals do not determine their scatter.
 constexpr double kFewestFreedom = 3;
 /// Steps with a smaller squared Mahalanobis length are noise, as each view selects other features.

@@ -26,6 +26,9 @@ struct ModelUncertainty {
     double boresight_rad = 0;  ///< of the sensor's axes, about each
     double range_bias_m = 0;   ///< of a LiDAR, the same for all its ranges
     double clock_s = 0;        ///< of the time of the measurement
+    /// Of brightness, over the target's RMS: details and reflectance that the model lacks. Neighbouring pixels
+    /// share them, over a distance that the estimator finds in its residuals. For images.
+    double detail = 0;
 
     friend bool operator==(const ModelUncertainty&, const ModelUncertainty&) = default;
 };
@@ -46,6 +49,8 @@ inline constexpr std::array<ModelErrorName, 8> kModelErrors{{
     {"range_bias_m", &ModelUncertainty::range_bias_m, 1},
     {"clock_s", &ModelUncertainty::clock_s, 1},
 }};
+/// The same, of errors that estimators are told, and that no scene is made with.
+inline constexpr std::array<ModelErrorName, 1> kToldErrors{{{"detail", &ModelUncertainty::detail, 1}}};
 
 /// Columns: the shifts of the pose, (rotation rad, translation m) as in pose_estimate.h, by one standard deviation
 /// of each nuisance. Their covariance is the matrix times its transpose.

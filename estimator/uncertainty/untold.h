@@ -23,6 +23,10 @@ inline constexpr double kUntoldShift_chi2 = 0.25;
 /// If it moves the pose by five standard deviations, less evidence suffices: noise exceeds it in 6 of 1000 tests.
 inline constexpr double kUntoldFar_chi2 = 25, kUntoldFar_sigmas = 2.5;
 
+/// A shift of the pose by up to eight standard deviations may enlarge its covariance instead of refusing it.
+/// Progressive rows move features in photographs of a chessboard by a webcam by two to seven.
+inline constexpr double kWidenedShift_chi2 = 64;
+
 /// The normal number that is as likely as this chi-square (E. B. Wilson, M. M. Hilferty, Proc. Natl. Acad. Sci. 17,
 /// 1931).
 [[nodiscard]] double as_normal(double chi2, double unknowns);

@@ -102,6 +102,14 @@ protected:
         const float gain = bright(rendered) / bright(frame.dn);
         for (float& dn : frame.dn) dn = static_cast<float>(sensor.black_dn) + gain * dn;
     }
+    /// Of Li et al. 2004.
+    void use_hapke(float albedo) {
+        Material& rock = scene.materials[0];
+        rock.kind = &kinds::hapke, rock.diffuse = {albedo, albedo, albedo};
+        rock.hapke.phase_b = 0.25F, rock.hapke.phase_c = 1;
+        rock.hapke.roughness_rad = 28 * static_cast<float>(kDegree);
+        rock.hapke.opposition_b0 = 1.4F, rock.hapke.opposition_h = 0.01F;
+    }
     Rigid3 off(std::mt19937_64& random) const {
         return displaced(truth, random_error(0.5 * kDegree, 0.005 * norm(truth.t), random));
     }
@@ -140,16 +148,12 @@ protected:
 /// 950 nm, where the single-scattering albedo is 0.43 instead of 0.33. The optics blur by about four pixels. An
 /// independent rasteriser reaches an overlap of 0.876.
 TEST_F(ErosFrame, FitsARenderAtThePublishedPose) {
-    Material& rock = scene.materials[0];
-    rock.kind = &kinds::hapke;
-    rock.hapke.phase_b = 0.25F, rock.hapke.phase_c = 1, rock.hapke.roughness_rad = 28 * static_cast<float>(kDegree);
-    rock.hapke.opposition_b0 = 1.4F, rock.hapke.opposition_h = 0.01F;
     Camera& camera = scene.cameras[0];
     camera.detector.reset();
     camera.white_radiance = full_scale_if * scene.sun->irradiance_w_m2 / std::numbers::pi;
     camera.optics.point_spread = PointSpreadFunction{.sigma_px = 4};
     const auto compared = [&](float albedo) {
-        rock.diffuse = {albedo, albedo, albedo};
+        use_hapke(albedo);
         const RenderScene real = *RenderScene::create(scene);
         ModelView view(real, camera, 0, at);
         FrameSettings s;
@@ -187,6 +191,29 @@ TEST_F(ErosFrame, DenseIsWithinWhatIsToldOrRefused) {
     const auto e = dense.align(frame, at, off(random), o);
     ASSERT_TRUE(e) << e.error().text();
     expect_honest(e->answer, e->T_camera_body, e->covariance, "dense");
+}
+
+/// Craters smaller than the plates, told as details of 20 % of the brightness. The optics' blur is told in part;
+/// the rest, to about four pixels, is solved.
+TEST_F(ErosFrame, DenseAnswersIfLackingDetailsAreTold) {
+    use_hapke(0.43F);
+    scene.cameras[0].optics.point_spread = PointSpreadFunction{.sigma_px = 2.5};
+    render_scene.emplace(*RenderScene::create(scene));
+    frame.dn = counts;
+    calibrate();
+    DenseAlignment dense(*render_scene, scene.cameras[0], 0);
+    DenseOptions o;
+    o.model = told;
+    o.model.detail = 0.2;
+    std::mt19937_64 random(3);
+    int usable = 0;
+    for (int k = 0; k < 2; ++k) {
+        const auto e = dense.align(frame, at, off(random), o);
+        ASSERT_TRUE(e) << e.error().text();
+        expect_honest(e->answer, e->T_camera_body, e->covariance, "dense, details");
+        usable += e->answer.usable() ? 1 : 0;
+    }
+    EXPECT_GE(usable, 1);
 }
 
 }  // namespace

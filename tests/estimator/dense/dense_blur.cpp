@@ -65,7 +65,7 @@ struct Disc {
         for (std::size_t p = 0; p < signal.size(); ++p)
             signal[p] += static_cast<float>(derivative[p].cast<double>().dot(step.head<6>()));
         const Exposure exposure{1 + step[6], step[7]};
-        const double found = fit_nuisance(images(), exposure, {1, kAll, 0}, {laplacian()}, 0).sigmas;
+        const double found = fit_nuisance(images(), exposure, {1, kAll, 0}, {laplacian()}, 0, 1).sigmas;
         signal = unmoved;
         return found;
     }
@@ -141,7 +141,7 @@ TEST(NuisanceFit, OfAMotionHasNoUnknowns) {
     (void)disc.score(0.4, random);
     std::vector<float> motion;
     for (const PixelDerivative& J : disc.derivative) motion.push_back(2 * J[0]);
-    const NuisanceFit fit = fit_nuisance(disc.images(), {}, {1, kAll, 0}, {motion}, 0.1);
+    const NuisanceFit fit = fit_nuisance(disc.images(), {}, {1, kAll, 0}, {motion}, 0.1, 1);
     EXPECT_EQ(fit.unknowns, 0);
     EXPECT_NEAR(std::sqrt(fit.covariance(0, 0)), 0.2, 1e-3);
     EXPECT_NEAR(fit.covariance(1, 1), 0, 1e-6);

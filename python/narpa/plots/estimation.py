@@ -63,7 +63,7 @@ def batch(document):
 
 def calibration(document):
     """Residuals of a camera's calibration: over the image, each by itself, and of each image."""
-    drawn = figure(11, 7.5, document["title"])
+    drawn = figure(11, 6.2, document["title"])
     grid = drawn.add_gridspec(2, 2, width_ratios=[1.7, 1], height_ratios=[1, 1])
     over_image, single, images = (drawn.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1]))
     u, v, du, dv = np.array(document["points"], float).reshape(-1, 4).T

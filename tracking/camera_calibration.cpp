@@ -7,12 +7,15 @@
 #include <cmath>
 
 #include "estimator/batch/camera_change.h"
+#include "estimator/least_squares/median.h"
 
 namespace narpa {
 namespace {
 
 /// In the first rounds the camera may be so wrong that answers are refused: their points are used too.
 constexpr int kRoundsWithoutRefusal = 2;
+/// And so wrong that points are matched with others: in these rounds each search starts from where it did at first.
+constexpr int kRoundsFromStarts = 3;
 /// Settled: no unknown moves by more, in its standard deviation.
 constexpr double kSettled_sigmas = 0.5;
 /// Fewer points of an image whose answer is refused say nothing.
@@ -33,14 +36,15 @@ public:
         batch_.prior_sigma = options.prior_sigma;
         for (const CalibrationImage& i : images) {
             const Rigid3 T_world_camera = world.camera_pose(camera_, 0, i.at);
-            poses_.push_back(inverse(T_world_camera) * i.at.T_world_body[target]);
+            starts_.push_back(inverse(T_world_camera) * i.at.T_world_body[target]);
             out_.views.emplace_back().file = i.file;
-            out_.views.back().T_camera_target = poses_.back();
+            out_.views.back().T_camera_target = starts_.back();
         }
     }
 
     [[nodiscard]] Result<CameraCalibration> calibrate() {
         if (const Status good = check(); !good) return good.error();
+        poses_ = starts_;
         BatchValues change{};
         for (out_.rounds = 1; out_.rounds <= options_.rounds_max; ++out_.rounds) {
             auto model = changed_camera(*camera_.model, change);
@@ -57,7 +61,7 @@ public:
                 at(change, e.unknown) = e.value;
             }
             take_poses();
-            out_.has_settled = out_.batch.settled && moved < kSettled_sigmas && out_.rounds > kRoundsWithoutRefusal;
+            out_.has_settled = out_.batch.settled && moved < kSettled_sigmas && out_.rounds >= kRoundsFromStarts;
             if (out_.has_settled) break;
         }
         out_.rounds = std::min(out_.rounds, options_.rounds_max);
@@ -129,11 +133,20 @@ private:
         return answer;
     }
 
-    /// Poses of the solution, from which the next round starts. Images that are not used start where they did.
+    /// Poses of the solution, from which the next round starts. Images that are not used, and in the first rounds
+    /// all, start where they did, at a range changed in the ratio of the solution's ranges to those of the starts:
+    /// that of the focal lengths, if the starts are as wrong as the camera.
     void take_poses() {
+        std::vector<double> ratios;
+        for (const BatchState& s : out_.batch.states)
+            ratios.push_back(norm(s.T_chaser_target.t) /
+                             norm(starts_[static_cast<std::size_t>(s.t_ns / kBetweenImages_ns)].t));
+        const double ratio = upper_median(std::span(ratios));
+        for (std::size_t i = 0; i < poses_.size(); ++i) poses_[i] = {starts_[i].q, ratio * starts_[i].t};
         for (const BatchState& s : out_.batch.states) {
             const auto i = static_cast<std::size_t>(s.t_ns / kBetweenImages_ns);
-            poses_[i] = out_.views[i].T_camera_target = s.T_chaser_target;
+            out_.views[i].T_camera_target = s.T_chaser_target;
+            if (out_.rounds >= kRoundsFromStarts) poses_[i] = s.T_chaser_target;
             out_.views[i].covariance = s.pose_covariance;
         }
         for (const BatchResidual& r : out_.batch.residuals)
@@ -208,7 +221,7 @@ private:
     const CalibrationOptions& options_;
     BatchOptions batch_;
     BatchInput input_;
-    std::vector<Rigid3> poses_;  ///< T_camera_target of each image
+    std::vector<Rigid3> starts_, poses_;  ///< T_camera_target of each image: given, and of the next search
     CameraCalibration out_;
 };
 

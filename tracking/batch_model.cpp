@@ -2,8 +2,7 @@
 
 #include <variant>
 
-#include "renderer/projection/brown_conrady.h"
-#include "renderer/projection/projection_kind.h"
+#include "estimator/batch/camera_change.h"
 
 namespace narpa {
 namespace {
@@ -23,23 +22,10 @@ Status scale_body(double factor, Body& body, Scene& scene) {
 }
 
 Status change_projection(const BatchValues& e, Camera& camera, const Scene& scene) {
-    ProjectionParameters p = camera.model->parameters();
-    if (!p.kind)
-        return Error{"camera \"" + camera.name + "\" has a projection without parameters that could be wrong",
-                     scene.file};
-    const double k1 = at(e, BatchUnknown::k1), k2 = at(e, BatchUnknown::k2);
-    if (k1 != 0 || k2 != 0) {
-        if (p.kind == &kPinhole) p = {&kBrownConrady, p.pinhole, {0, 0, 0, 0}};
-        if (p.kind != &kBrownConrady)
-            return Error{
-                "a model error of k1 or k2 is for cameras without distortion or with that of OpenCV, which \"" +
-                    camera.name + "\" is not",
-                scene.file};
-        p.values[0] += k1, p.values[1] += k2;
-    }
-    p.pinhole.fx *= 1 + at(e, BatchUnknown::focal), p.pinhole.fy *= 1 + at(e, BatchUnknown::focal);
-    p.pinhole.cx += at(e, BatchUnknown::centre_x), p.pinhole.cy += at(e, BatchUnknown::centre_y);
-    camera.model = make_projection(p);
+    auto changed = changed_camera(*camera.model, e);
+    if (!changed)
+        return Error{"a model error of camera \"" + camera.name + "\": " + changed.error().what, scene.file};
+    camera.model = *std::move(changed);
     return Ok{};
 }
 
@@ -66,8 +52,7 @@ Status apply_model_errors(const BatchValues& e, std::size_t target, Scene& scene
         if (Status good = displace(e, BatchUnknown::camera_rx, BatchUnknown::camera_x, c, c.T_mount_camera, scene);
             !good)
             return good;
-        for (const BatchUnknown u : {BatchUnknown::focal, BatchUnknown::centre_x, BatchUnknown::centre_y,
-                                     BatchUnknown::k1, BatchUnknown::k2})
+        for (const BatchUnknown u : kCameraUnknowns)
             if (at(e, u) != 0) {
                 if (Status good = change_projection(e, c, scene); !good) return good;
                 break;
@@ -84,7 +69,7 @@ BatchValues expected_of(const BatchValues& error) {
     BatchValues expected;
     for (std::size_t i = 0; i < kBatchUnknowns; ++i) {
         const auto u = static_cast<BatchUnknown>(i);
-        if (u == BatchUnknown::scale || u == BatchUnknown::focal)
+        if (u == BatchUnknown::scale || u == BatchUnknown::focal || u == BatchUnknown::aspect)
             expected[i] = 1 / (1 + error[i]) - 1;
         else if (u == BatchUnknown::clock || u == BatchUnknown::range_bias)
             expected[i] = error[i];  // of the data, not of the scene

@@ -93,6 +93,26 @@ BatchErrors errors_of(const BatchResult& r, const BatchTruth& truth) {
     return e;
 }
 
+std::string undetermined_text(const BatchResult& r) {
+    std::string out;
+    for (const BatchDirection& d : r.undetermined)
+        if (!is_single(d))
+            out += fmt::format("    not determined together, sigma {:.2f} of the prior: {}\n", d.sigma,
+                               to_text(d, r.unknowns));
+    return out;
+}
+
+nlohmann::json undetermined_json(const BatchResult& r) {
+    nlohmann::json out = nlohmann::json::array();
+    for (const BatchDirection& d : r.undetermined) {
+        nlohmann::json parts = nlohmann::json::object();
+        for (std::size_t i = 0; i < d.parts.size(); ++i)
+            parts[std::string(row_of(r.unknowns[i].unknown).name)] = d.parts[i];
+        out.push_back({{"parts", parts}, {"sigma", d.sigma}});
+    }
+    return out;
+}
+
 std::string to_text(const BatchResult& r, const BatchTruth& truth) {
     const auto frames =
         std::ranges::count_if(r.residuals, [](const auto& f) { return !f.is_sweep && f.points > 0; });
@@ -103,10 +123,7 @@ std::string to_text(const BatchResult& r, const BatchTruth& truth) {
         "{} frames and {} sweeps in one least-squares problem: {} unknowns, {} residuals, {} linearisations{}\n",
         frames, sweeps, r.parameters, r.numbers, r.linearisations, r.settled ? "" : ", not settled");
     if (!r.unknowns.empty()) out += table_of(r, truth);
-    for (const BatchDirection& d : r.undetermined)
-        if (!is_single(d))
-            out += fmt::format("    not determined together, sigma {:.2f} of the prior: {}\n", d.sigma,
-                               to_text(d, r.unknowns));
+    out += undetermined_text(r);
     if (!r.unknowns.empty())
         out += fmt::format("    NEES of the unknowns {:.2f}, {} expected\n", e.unknowns_nees, r.unknowns.size());
     out += fmt::format("    trajectory: RMS {:.4f} deg, {:.3g} m; NEES {:.2f}, 6 expected\n",

@@ -28,6 +28,9 @@ struct BatchErrors {
 [[nodiscard]] BatchErrors errors_of(const BatchResult& result, const BatchTruth& truth);
 
 [[nodiscard]] std::string to_text(const BatchResult& result, const BatchTruth& truth);
+/// The combinations of several unknowns that are not determined, a line each.
+[[nodiscard]] std::string undetermined_text(const BatchResult& result);
+[[nodiscard]] nlohmann::json undetermined_json(const BatchResult& result);
 [[nodiscard]] nlohmann::json to_json(const BatchResult& result, const BatchTruth& truth);
 /// A row for each frame and sweep used: what it measures, and the pose of the target at its time.
 [[nodiscard]] std::string batch_rows(const BatchResult& result, const BatchTruth& truth);

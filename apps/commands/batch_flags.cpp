@@ -9,11 +9,12 @@
 namespace narpa::cli {
 namespace {
 
-std::string names_of_unknowns() {
+std::string names_of_unknowns(const BatchValues* known) {
     std::string names;
     std::string_view last;
-    for (const BatchUnknownRow& row : batch_unknowns()) {
-        if (group_of(row.name) == last) continue;
+    for (std::size_t i = 0; i < kBatchUnknowns; ++i) {
+        const BatchUnknownRow& row = batch_unknowns()[i];
+        if (group_of(row.name) == last || (known && (*known)[i] == 0)) continue;
         last = group_of(row.name);
         names += (names.empty() ? "" : ", ") + std::string(last);
     }
@@ -22,7 +23,7 @@ std::string names_of_unknowns() {
 
 }  // namespace
 
-Result<BatchValues> batch_values(const std::string& text, const std::string& option, bool may_be_lone,
+Result<BatchValues> batch_values(const std::string& text, const std::string& option, const BatchValues* known,
                                  bool may_be_negative) {
     BatchValues values{};
     for (std::size_t from = 0; from < text.size();) {
@@ -43,13 +44,13 @@ Result<BatchValues> batch_values(const std::string& text, const std::string& opt
         bool found = false;
         for (std::size_t i = 0; i < kBatchUnknowns; ++i) {
             const BatchUnknownRow& row = batch_unknowns()[i];
-            if (name != row.name && name != group_of(row.name)) continue;
+            if ((name != row.name && name != group_of(row.name)) || (known && (*known)[i] == 0)) continue;
             found = true;
-            values[i] = row.unit * (is_lone ? row.default_sigma : value);
+            values[i] = is_lone && known ? (*known)[i] : row.unit * value;
         }
-        if (!found || (is_lone && !may_be_lone))
-            return Error{
-                fmt::format("{} \"{}\": expected NAME=VALUE with one of {}", option, item, names_of_unknowns())};
+        if (!found || (is_lone && !known))
+            return Error{fmt::format("{} \"{}\": expected NAME=VALUE with one of {}", option, item,
+                                     names_of_unknowns(known))};
     }
     return values;
 }

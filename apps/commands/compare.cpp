@@ -27,6 +27,7 @@ struct CompareOptions {
     PoseOptions pose;
     double time_s = 0;
     int spp = 64, frame_spp = 0, threads = 0;
+    bool only_target = false;
     std::optional<double> min_overlap, min_correlation, max_shift_px;
 };
 
@@ -158,6 +159,7 @@ ExpectedFrame expected_frame(const CompareOptions& o, const World& world, std::s
     }
     ExpectedFrame out{expected_signal(unit.camera(), unit.radiance()), std::move(shown.variance),
                       std::move(shown.body), o.frame_spp > 0 ? static_cast<double>(o.spp) / o.frame_spp : 0};
+    out.knows_background = !o.only_target;
     const auto& [r, g, b] = sensor_model(unit.camera()).dn_per_radiance;
     for (float& v : out.variance) v *= static_cast<float>(std::pow(r + g + b, 2));
     return out;
@@ -218,6 +220,8 @@ Command add_compare(Parser app) {
     c.option("--target", o->target,
              "Body that is compared (default: the first with a mesh that does not carry the camera)")
         .type_name("BODY");
+    c.flag("--only-target", o->only_target,
+           "Only the target's pixels count: behind it the frame shows what the scene has not, such as a room");
     c.option("--time", o->time_s, "Simulation time of the frame (default: 0)")
         .type_name("SECONDS")
         .range(-9e9, 9e9);

@@ -86,12 +86,13 @@ Result<BatchPlan> plan_of(const RunEstimate& run, const BatchSensors& sensors, c
             fmt::format("--batch goes with methods that find points, not with \"{}\": expected --method {}",
                         tracker.method->name, camera_methods_that_find_points())};
     if (!flags.unknowns.empty()) {
+        const BatchValues all = all_batch_priors();
         const auto sigma = flags.unknowns == "none" ? Result<BatchValues>(BatchValues{})
-                                                    : batch_values(flags.unknowns, "--unknowns", true, false);
+                                                    : batch_values(flags.unknowns, "--unknowns", &all, false);
         if (!sigma) return sigma.error();
         plan.options.prior_sigma = *sigma;
     }
-    const auto error = batch_values(flags.model_error, "--model-error", false, true);
+    const auto error = batch_values(flags.model_error, "--model-error", nullptr, true);
     if (!error) return error.error();
     plan.error = *error;
     const auto path = path_sigma_of(flags.path_sigma);

@@ -27,9 +27,9 @@ struct BatchSensors {
 [[nodiscard]] Outcome estimate_batch(const RunEstimate& run, const BatchSensors& sensors, const BatchFlags& flags,
                                      const TrackerOptions& tracker);
 
-/// Parses NAME=VALUE,... with the names of batch_unknowns(), or of their groups. `option`: for messages.
-/// `may_be_lone`: a NAME alone has the row's default.
-[[nodiscard]] Result<BatchValues> batch_values(const std::string& text, const std::string& option, bool may_be_lone,
-                                               bool may_be_negative);
+/// Parses NAME=VALUE,... with the names of batch_unknowns(), or of their groups. `option`: for messages. `known`:
+/// only names with a value there, which a NAME alone has; null: all names, none alone.
+[[nodiscard]] Result<BatchValues> batch_values(const std::string& text, const std::string& option,
+                                               const BatchValues* known, bool may_be_negative);
 
 }  // namespace narpa::cli

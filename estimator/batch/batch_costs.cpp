@@ -11,24 +11,36 @@ using StateJacobian = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kStateSiz
 
 class StateManifold final : public ceres::Manifold {
 public:
+    explicit StateManifold(bool has_motion) : errors_(estimated_errors(has_motion)) {}
+
     int AmbientSize() const override { return kStateSize; }
-    int TangentSize() const override { return 12; }
+    int TangentSize() const override { return static_cast<int>(errors_.size()); }
     bool Plus(const double* x, const double* delta, double* sum) const override {
-        pack(displaced(unpack(x), Vector12(Eigen::Map<const Eigen::Matrix<double, 12, 1>>(delta))), sum);
+        Vector12 error = Vector12::Zero();
+        for (std::size_t i = 0; i < errors_.size(); ++i) error[errors_[i]] = delta[i];
+        pack(displaced(unpack(x), error), sum);
         return true;
     }
     bool PlusJacobian(const double*, double* jacobian) const override {
-        Eigen::Map<Eigen::Matrix<double, kStateSize, 12, Eigen::RowMajor>>(jacobian).setIdentity();
+        Eigen::Map<RowMajor> J(jacobian, kStateSize, TangentSize());
+        J.setZero();
+        for (int i = 0; i < TangentSize(); ++i) J(errors_[static_cast<std::size_t>(i)], i) = 1;
         return true;
     }
     bool Minus(const double* y, const double* x, double* delta) const override {
-        Eigen::Map<Eigen::Matrix<double, 12, 1>>{delta} = error_between(unpack(x), unpack(y));
+        const Vector12 error = error_between(unpack(x), unpack(y));
+        for (std::size_t i = 0; i < errors_.size(); ++i) delta[i] = error[errors_[i]];
         return true;
     }
     bool MinusJacobian(const double*, double* jacobian) const override {
-        Eigen::Map<Eigen::Matrix<double, 12, kStateSize, Eigen::RowMajor>>(jacobian).setIdentity();
+        Eigen::Map<RowMajor> J(jacobian, TangentSize(), kStateSize);
+        J.setZero();
+        for (int i = 0; i < TangentSize(); ++i) J(i, errors_[static_cast<std::size_t>(i)]) = 1;
         return true;
     }
+
+private:
+    std::span<const int> errors_;
 };
 
 /// Writes derivatives by a state's error to the block's Jacobian, if Ceres wants it.
@@ -200,8 +212,14 @@ RelativeState unpack(const double* b) {
     return {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}, {b[6], b[7], b[8], b[9]}, {b[10], b[11], b[12]}};
 }
 
-std::unique_ptr<ceres::Manifold> make_state_manifold() {
-    return std::make_unique<StateManifold>();
+std::span<const int> estimated_errors(bool has_motion) {
+    static constexpr std::array kAll{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
+    static constexpr std::array kOfPose{0, 1, 2, 6, 7, 8};
+    return has_motion ? std::span<const int>(kAll) : std::span<const int>(kOfPose);
+}
+
+std::unique_ptr<ceres::Manifold> make_state_manifold(bool has_motion) {
+    return std::make_unique<StateManifold>(has_motion);
 }
 
 SharedBlock::SharedBlock(const BatchValues& prior_sigma) {

@@ -1,8 +1,9 @@
 /// estimator/batch/batch_costs.h - the residuals of the batch problem for Ceres.
 ///
 /// A state is a parameter block of kStateSize numbers: position, velocity, attitude (w, x, y, z), rate. Its
-/// manifold is that of RelativeState's errors. Cost functions give derivatives by the error in the first twelve
-/// columns and 0 in the last, for which the manifold's own derivative is [1; 0].
+/// manifold is that of RelativeState's errors, or of those of position and attitude alone. Cost functions give
+/// derivatives by the error in the first twelve columns and 0 in the last, for which the manifold's own derivative
+/// is [1; 0], or the columns of it that vary.
 #pragma once
 
 #include <ceres/cost_function.h>
@@ -10,6 +11,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -23,7 +25,9 @@ inline constexpr int kStateSize = 13;
 
 void pack(const RelativeState& state, double* block);
 [[nodiscard]] RelativeState unpack(const double* block);
-[[nodiscard]] std::unique_ptr<ceres::Manifold> make_state_manifold();
+/// Of the errors of a state that are estimated: the tangent space of its block, in their order.
+[[nodiscard]] std::span<const int> estimated_errors(bool has_motion);
+[[nodiscard]] std::unique_ptr<ceres::Manifold> make_state_manifold(bool has_motion);
 
 /// The unknowns that are estimated, as one parameter block in units of their priors' standard deviations.
 class SharedBlock {

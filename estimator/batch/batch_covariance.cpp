@@ -51,18 +51,20 @@ BatchState state_of(const BatchNode& node, const RelativeState& state, double sc
 Eigen::Matrix<double, 13, 13> with_scale(const ceres::Covariance& covariance, const BatchProblem& problem,
                                          std::size_t node) {
     Eigen::Matrix<double, 13, 13> out = Eigen::Matrix<double, 13, 13>::Zero();
-    Eigen::Matrix<double, 12, 12, Eigen::RowMajor> C;
+    const auto errors = estimated_errors(problem.options().has_motion);
+    const auto k = static_cast<Eigen::Index>(errors.size());
+    RowMajor C(k, k);
     covariance.GetCovarianceBlockInTangentSpace(problem.state_block(node), problem.state_block(node), C.data());
-    out.topLeftCorner<12, 12>() = C;
+    out(errors, errors) = C;
     const int place = problem.shared().place(BatchUnknown::scale);
     if (place < 0) return out;
     const double sigma = problem.shared().sigma(static_cast<std::size_t>(place));
     const auto n = static_cast<Eigen::Index>(problem.shared().size());
-    RowMajor across(12, n), of_shared(n, n);
+    RowMajor across(k, n), of_shared(n, n);
     covariance.GetCovarianceBlockInTangentSpace(problem.state_block(node), problem.shared_block(), across.data());
     covariance.GetCovarianceBlock(problem.shared_block(), problem.shared_block(), of_shared.data());
-    out.topRightCorner<12, 1>() = sigma * across.col(place);
-    out.bottomLeftCorner<1, 12>() = out.topRightCorner<12, 1>().transpose();
+    const Eigen::VectorXd by_scale = sigma * across.col(place);
+    out(errors, 12) = by_scale, out(12, errors) = by_scale.transpose();
     out(12, 12) = sigma * sigma * of_shared(place, place);
     return out;
 }

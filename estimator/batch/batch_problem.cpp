@@ -51,7 +51,7 @@ std::vector<double*> BatchProblem::blocks_of(std::size_t node) {
 Status BatchProblem::linearise(bool associates, bool has_loss) {
     problem_ = std::make_unique<ceres::Problem>();
     for (auto& block : states_)
-        problem_->AddParameterBlock(block.data(), kStateSize, make_state_manifold().release());
+        problem_->AddParameterBlock(block.data(), kStateSize, make_state_manifold(options_.has_motion).release());
     if (shared_.size() > 0) {
         problem_->AddParameterBlock(values_.data(), static_cast<int>(shared_.size()));
         problem_->AddResidualBlock(prior_cost(shared_.size()).release(), nullptr, values_.data());
@@ -60,7 +60,7 @@ Status BatchProblem::linearise(bool associates, bool has_loss) {
         if (options_.path && nodes_[k].time->T_chaser_target)
             problem_->AddResidualBlock(path_cost(*nodes_[k].time, *options_.path, shared_).release(), nullptr,
                                        blocks_of(k));
-        if (k == 0) continue;
+        if (k == 0 || !options_.has_motion) continue;
         const double dt_s = 1e-9 * static_cast<double>(nodes_[k].time->t_ns - nodes_[k - 1].time->t_ns);
         problem_->AddResidualBlock(motion_cost(options_.motion, dt_s, state(k - 1)).release(), nullptr,
                                    states_[k - 1].data(), states_[k].data());
@@ -72,7 +72,7 @@ Status BatchProblem::linearise(bool associates, bool has_loss) {
     }
     if (rms_start_.empty())
         for (const Score& s : scores_) rms_start_.push_back(s.rms);
-    if (used < kFewestBatchTimes)
+    if (used < fewest_times(options_))
         return Error{"too few frames and sweeps see the target at the poses of the start"};
     return Ok{};
 }
@@ -117,9 +117,10 @@ void BatchProblem::report(BatchResult& out) const {
         r.points = static_cast<std::size_t>(groups);
         r.rms = std::sqrt(residuals.value.squaredNorm() / groups);
         r.score = (score.whitening * residuals.value).squaredNorm();
-        out.jacobian_nonzeros += static_cast<std::size_t>(r.score_numbers) * (12 + shared_.size());
+        out.jacobian_nonzeros += static_cast<std::size_t>(r.score_numbers) *
+                                 (estimated_errors(options_.has_motion).size() + shared_.size());
     }
-    if (nodes_.size() > 1) out.jacobian_nonzeros += (nodes_.size() - 1) * 12 * 24;
+    if (nodes_.size() > 1 && options_.has_motion) out.jacobian_nonzeros += (nodes_.size() - 1) * 12 * 24;
     out.jacobian_nonzeros += shared_.size() * shared_.size();
 }
 

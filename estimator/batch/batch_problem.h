@@ -18,6 +18,7 @@ public:
     /// The arguments outlive it. `prior_sigma`: of the unknowns in use.
     BatchProblem(const BatchInput& input, const BatchOptions& options, const BatchValues& prior_sigma);
 
+    [[nodiscard]] const BatchOptions& options() const noexcept { return options_; }
     [[nodiscard]] std::size_t nodes() const noexcept { return nodes_.size(); }
     [[nodiscard]] const BatchNode& node(std::size_t k) const noexcept { return nodes_[k]; }
     /// In units of the model (sensor_geometry.h).

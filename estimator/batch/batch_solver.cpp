@@ -32,6 +32,8 @@ Status check(const BatchInput& input, const BatchOptions& options) {
                                      batch_unknowns()[i].name, options.prior_sigma[i])};
     if (options.path && !(options.path->rotation_rad > 0 && options.path->position_m > 0))
         return Error{"standard deviations of the commanded poses: expected more than 0"};
+    if (!options.has_motion && (options.path || at(options.prior_sigma, BatchUnknown::clock) > 0))
+        return Error{"poses without motion have neither path nor clock"};
     return Ok{};
 }
 
@@ -48,9 +50,9 @@ BatchValues priors_in_use(const BatchInput& input, const BatchOptions& options) 
 Result<BatchResult> solve_batch(const BatchInput& input, const BatchOptions& options) {
     if (auto good = check(input, options); !good) return good.error();
     BatchProblem problem(input, options, priors_in_use(input, options));
-    if (problem.nodes() < kFewestBatchTimes)
+    if (problem.nodes() < fewest_times(options))
         return Error{fmt::format("frames and sweeps with a pose at {} times, expected at least {}", problem.nodes(),
-                                 kFewestBatchTimes)};
+                                 fewest_times(options))};
     BatchResult out;
     for (out.linearisations = 1; out.linearisations <= options.linearisations; ++out.linearisations) {
         const Status linear =

@@ -54,6 +54,9 @@ struct PathSigma {
 };
 
 struct BatchOptions {
+    /// False: the poses at different times have nothing to do with each other, and a state is a pose; neither a
+    /// path nor a clock can then be estimated.
+    bool has_motion = true;
     MotionModel motion{.acceleration_psd = 1e-3, .angular_acceleration_psd = 1e-5};
     BatchValues prior_sigma = default_batch_priors();  ///< SI; 0: known
     std::optional<PathSigma> path{};
@@ -61,7 +64,10 @@ struct BatchOptions {
     double frame_variance = 1, sweep_variance = 1;
     int linearisations = 15;  ///< at most
 };
-inline constexpr std::size_t kFewestBatchTimes = 4;
+inline constexpr std::size_t kFewestBatchTimes = 4;  ///< without motion 1
+[[nodiscard]] constexpr std::size_t fewest_times(const BatchOptions& options) noexcept {
+    return options.has_motion ? kFewestBatchTimes : 1;
+}
 
 /// One unknown of the model.
 struct BatchEstimate {
@@ -107,7 +113,7 @@ struct BatchResult {
     std::string solver;                      ///< name of the linear solver
 };
 
-/// Errors: fewer than kFewestBatchTimes times with measurements, no unknown or option that can be used, no
+/// Errors: fewer than fewest_times() with measurements, no unknown or option that can be used, no
 /// convergence of Ceres, a singular covariance.
 [[nodiscard]] Result<BatchResult> solve_batch(const BatchInput& input, const BatchOptions& options);
 

@@ -10,10 +10,14 @@ namespace {
 constexpr std::array<BatchUnknownRow, kBatchUnknowns> kBatchRows{{
     {"scale", 1, 0.02, true, true, true},
     {"focal", 1, 0.02, true, true, false},
+    {"aspect", 1, 0.01, false, true, false},
     {"centre_px.x", 1, 5, true, true, false},
     {"centre_px.y", 1, 5, true, true, false},
     {"k1", 1, 0.1, true, true, false},
     {"k2", 1, 0.1, false, true, false},
+    {"p1", 1, 0.01, false, true, false},
+    {"p2", 1, 0.01, false, true, false},
+    {"k3", 1, 0.1, false, true, false},
     {"camera_mount_deg.x", kDegree, 0.5, true, true, false},
     {"camera_mount_deg.y", kDegree, 0.5, true, true, false},
     {"camera_mount_deg.z", kDegree, 0.5, true, true, false},
@@ -57,6 +61,12 @@ BatchValues default_batch_priors() {
     BatchValues sigmas{};
     for (std::size_t i = 0; i < kBatchUnknowns; ++i)
         if (kBatchRows[i].by_default) sigmas[i] = kBatchRows[i].unit * kBatchRows[i].default_sigma;
+    return sigmas;
+}
+
+BatchValues all_batch_priors() {
+    BatchValues sigmas{};
+    for (std::size_t i = 0; i < kBatchUnknowns; ++i) sigmas[i] = kBatchRows[i].unit * kBatchRows[i].default_sigma;
     return sigmas;
 }
 

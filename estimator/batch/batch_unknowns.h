@@ -17,12 +17,18 @@
 namespace narpa {
 
 enum class BatchUnknown : std::uint8_t {
-    scale,      ///< of the target's size about its origin: truth / model - 1
-    focal,      ///< of the focal length: truth / model - 1
-    centre_x,   ///< of the principal point, px
-    centre_y,   ///
-    k1,         ///< radial distortion before the model's own: (1 + k1 r^2 + k2 r^4), r = tan(angle from the axis)
-    k2,         ///
+    scale,     ///< of the target's size about its origin: truth / model - 1
+    focal,     ///< of the focal lengths: truth / model - 1
+    aspect,    ///< of fy / fx: truth / model - 1
+    centre_x,  ///< of the principal point, px
+    centre_y,  ///
+    /// Coefficients of distortion (brown_conrady.h): added to those of a camera with that model or with none; of
+    /// other models, a distortion before the model's own.
+    k1,
+    k2,
+    p1,
+    p2,
+    k3,
     camera_rx,  ///< rotation of the camera on the chaser, rad, about its own axes
     camera_ry,  ///
     camera_rz,  ///
@@ -40,7 +46,7 @@ enum class BatchUnknown : std::uint8_t {
     clock,
     range_bias,  ///< measured minus true range, m
 };
-inline constexpr std::size_t kBatchUnknowns = 20;
+inline constexpr std::size_t kBatchUnknowns = 24;
 
 /// By BatchUnknown; SI units.
 using BatchValues = std::array<double, kBatchUnknowns>;
@@ -72,6 +78,9 @@ struct BatchUnknownRow {
 
 /// Prior standard deviations, SI; 0: known, not estimated.
 [[nodiscard]] BatchValues default_batch_priors();
+
+/// The same with default standard deviations for all.
+[[nodiscard]] BatchValues all_batch_priors();
 
 /// True if an unknown changes what is measured by the sensors that there are.
 [[nodiscard]] bool is_of_sensors(const BatchUnknownRow& row, bool camera, bool lidar) noexcept;

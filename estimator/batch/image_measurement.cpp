@@ -7,61 +7,11 @@
 #include <vector>
 
 #include "base/constants.h"
+#include "estimator/batch/camera_change.h"
 #include "estimator/batch/measurement.h"
 
 namespace narpa {
 namespace {
-
-/// Image point of a direction through the changed camera, and its derivatives.
-struct ChangedImage {
-    Eigen::Vector2d pixel;
-    Eigen::Matrix<double, 2, 3> by_point;
-    Eigen::Matrix<double, 2, 5> by_camera;  ///< by focal, centre x and y, k1, k2
-};
-
-/// The model's camera with the changes of focal length, principal point and distortion.
-class ChangedCamera {
-public:
-    ChangedCamera(const CameraModel& model, const BatchValues& unknowns)
-        : model_(model),
-          focal_(at(unknowns, BatchUnknown::focal)),
-          k1_(at(unknowns, BatchUnknown::k1)),
-          k2_(at(unknowns, BatchUnknown::k2)) {
-        const auto centre = model.project({0, 0, 1});
-        centre_ = centre ? Eigen::Vector2d(centre->x, centre->y) : Eigen::Vector2d::Zero();
-        shift_ = {at(unknowns, BatchUnknown::centre_x), at(unknowns, BatchUnknown::centre_y)};
-    }
-
-    /// `p`: camera axes. False if it has no image.
-    [[nodiscard]] bool project(const Vec3& p, ChangedImage& out) const {
-        if (!(p.z > 0)) return false;
-        const double u = p.x / p.z, v = p.y / p.z, s = u * u + v * v;
-        const double stretch = 1 + s * (k1_ + s * k2_), stretch_by_s = k1_ + 2 * s * k2_;
-        const Vec3 bent{u * stretch, v * stretch, 1};
-        const auto image = model_.project(bent);
-        if (!image) return false;
-        const Eigen::Matrix<double, 2, 3> J = (1 + focal_) * to_eigen(model_.jacobian(bent));
-        const Eigen::Matrix2d by_bent = J.leftCols<2>();
-        const Eigen::Vector2d plane(u, v);
-        Eigen::Matrix2d bent_by_plane = stretch * Eigen::Matrix2d::Identity();
-        bent_by_plane += 2 * stretch_by_s * plane * plane.transpose();
-        Eigen::Matrix<double, 2, 3> plane_by_point;
-        plane_by_point << 1 / p.z, 0, -u / p.z, 0, 1 / p.z, -v / p.z;
-        const Eigen::Vector2d at_model(image->x, image->y), from_centre = at_model - centre_;
-        out.pixel = centre_ + (1 + focal_) * from_centre + shift_;
-        out.by_point = by_bent * bent_by_plane * plane_by_point;
-        out.by_camera.col(0) = from_centre;
-        out.by_camera.middleCols<2>(1).setIdentity();
-        out.by_camera.col(3) = by_bent * (s * plane);
-        out.by_camera.col(4) = by_bent * (s * s * plane);
-        return true;
-    }
-
-private:
-    const CameraModel& model_;
-    double focal_, k1_, k2_;
-    Eigen::Vector2d centre_, shift_;
-};
 
 Eigen::Matrix2d matrix_of(const PixelCovariance& c) {
     Eigen::Matrix2d m;
@@ -78,8 +28,11 @@ public:
 
     int dimension() const noexcept override { return 2; }
     std::span<const BatchUnknown> unknowns() const noexcept override {
-        static constexpr std::array kUnknowns{BatchUnknown::scale,    BatchUnknown::focal, BatchUnknown::centre_x,
-                                              BatchUnknown::centre_y, BatchUnknown::k1,    BatchUnknown::k2};
+        static constexpr auto kUnknowns = [] {
+            std::array<BatchUnknown, 1 + kCameraUnknowns.size()> all{BatchUnknown::scale};
+            std::ranges::copy(kCameraUnknowns, all.begin() + 1);
+            return all;
+        }();
         return kUnknowns;
     }
     void associate(const Rigid3&, const BatchValues&) override {}
@@ -89,7 +42,7 @@ public:
         const double size = 1 + at(values, BatchUnknown::scale);
         const auto n = static_cast<Eigen::Index>(points_.size());
         out.value.resize(2 * n);
-        out.jacobian.resize(2 * n, 12);
+        out.jacobian.resize(2 * n, 7 + static_cast<Eigen::Index>(kCameraUnknowns.size()));
         ChangedImage image;
         for (Eigen::Index i = 0; i < n; ++i) {
             const auto k = static_cast<std::size_t>(i);
@@ -100,7 +53,7 @@ public:
             rows.leftCols<3>() = image.by_point * skew(to_eigen(size * turned));
             rows.middleCols<3>(3) = -image.by_point;
             rows.col(6) = -image.by_point * to_eigen(turned);
-            rows.rightCols<5>() = -image.by_camera;
+            rows.rightCols<kCameraUnknowns.size()>() = -image.by_camera;
         }
         return true;
     }

@@ -168,10 +168,8 @@ double FeatureAlignment::gain_about(const std::vector<FeatureMatch>& matches, co
     return gains.empty() ? 1 : upper_median(std::span(gains));
 }
 
-/// Matches features on the target in the last rendered view with the frame. `gain`: ratio of the frame's light to
-/// the view's, as found in the previous view.
-void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
-                              double& gain, ModelMatches& points) {
+bool FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale,
+                              bool is_near, double& gain, ModelMatches& points) {
     points = {};
     const auto target = static_cast<int>(view_.target());
     find_target();
@@ -182,14 +180,14 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
     const auto match = [&] {
         view_bytes = scale.scaled(view_.radiance(), gain);
         view_bytes.height = frame.height, view_bytes.pixels.resize(pixels);
-        return match_corners(view_bytes, frame_bytes, on_target_, settings_.features);
+        return match_corners(view_bytes, frame_bytes, on_target_, settings_.features, is_near);
     };
-    std::vector<FeatureMatch> matches = match();
-    if (const double found = gain_about(matches, frame); std::abs(found / gain - 1) > kSameLight)
-        gain = found, matches = match();
+    CornerMatches corners = match();
+    if (const double found = gain_about(corners.matches, frame); std::abs(found / gain - 1) > kSameLight)
+        gain = found, corners = match();
     const Rigid3 T_target_world = inverse(view_.T_world_target());
     HitBatch hits;
-    for (const FeatureMatch& m : matches) {
+    for (const FeatureMatch& m : corners.matches) {
         const double u = m.view_u, v = m.view_v;
         view_.trace_pixels(std::array<ImagePoint, 5>{{{u, v},
                                                       {u + kNeighbour_px, v},
@@ -205,6 +203,7 @@ void FeatureAlignment::gather(const MeasuredImage& frame, const ByteImage& frame
         points.pixels.push_back({m.frame_u, m.frame_v});
         points.noise.push_back(C);
     }
+    return corners.coarse_levels_mislead;
 }
 
 /// Response of the matches to the least observed motions, from the pose of the last view: the identity if all are
@@ -320,10 +319,13 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
     double gain = 1, floor_px = 1;  // until there are matches
     ModelMatches points;
     Rigid3 T_of_view = guess;
+    bool is_near = false;  // the pose of the view: its matches agree
     for (int k = 0; k < settings_.renders_max; ++k) {
         FeatureRound& round = estimate.rounds.emplace_back();
         view_.render(estimate.T_camera_target, render_settings, false);
-        gather(frame, frame_bytes, scale, gain, points);
+        bool misled = gather(frame, frame_bytes, scale, is_near, gain, points);
+        if (misled && !is_near && points.size() < kFewestMatches)
+            gather(frame, frame_bytes, scale, true, gain, points), misled = false;
         to_mid_exposure(estimate.T_camera_target, motion, times_, points.pixels, points.body_m);
         if (points.size() < kFewestMatches) {
             estimate.status = FeatureStatus::few_matches;
@@ -378,8 +380,10 @@ FeatureEstimate FeatureAlignment::estimate(const MeasuredImage& frame, const Bod
         estimate.covariance *= freedom / (freedom - 2);
         estimate.covariance *= points.inflation(camera, fit.T_camera_body, C, estimate.covariance, floor_px);
         estimate.status = FeatureStatus::unsettled;
-        if (moved_px < settings_.settled_px ||
-            normalised_error_squared(step, estimate.covariance) < kSettled_chi2) {
+        const bool leaves_points_out = misled && !is_near;
+        is_near = floor_px <= settings_.floor_max_px;
+        if (!leaves_points_out && (moved_px < settings_.settled_px ||
+                                   normalised_error_squared(step, estimate.covariance) < kSettled_chi2)) {
             estimate.status = FeatureStatus::settled;
             break;
         }

@@ -88,8 +88,10 @@ public:
 private:
     [[nodiscard]] FeatureEstimate estimate(const MeasuredImage& frame, const BodyPoses& at, const Rigid3& guess,
                                            const ApparentMotion& motion);
-    void gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale, double& gain,
-                ModelMatches& points);
+    /// Matches features on the target in the last rendered view with the frame. `gain`: ratio of the frame's light
+    /// to the view's, as found in the previous view. `is_near`, result: as of match_corners.
+    bool gather(const MeasuredImage& frame, const ByteImage& frame_bytes, const ByteScale& scale, bool is_near,
+                double& gain, ModelMatches& points);
     void find_target();
     /// Ratio of the frame's light to the view's about these matches: median over their windows; 1 without any.
     [[nodiscard]] double gain_about(const std::vector<FeatureMatch>& matches, const MeasuredImage& frame) const;

@@ -12,6 +12,10 @@ namespace {
 /// Largest forward-backward error of a tracked corner, px.
 constexpr float kRoundTrip_px = 0.5f;
 constexpr int kFlowWindow_px = 2 * kFlowHalfWindow_px + 1, kFlowLevels = 4;
+/// Where fewer than this part of the corners are found, fewer levels are tried, as long as they find more by this
+/// factor.
+constexpr double kEnoughFound = 0.9, kMoreFound = 1.1;
+constexpr int kFewestFlowLevels = 2;
 /// Part of the frame's pixels that may be brighter than the top of the scale.
 constexpr double kBeyondTop = 0.002;
 /// Variance of rounding to whole steps.
@@ -20,6 +24,36 @@ constexpr double kRoundingVariance = 1.0 / 12;
 cv::Mat as_mat(const ByteImage& image) {
     return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data())};
 }
+
+/// Optical flow from a view into a frame and back.
+class Flow {
+public:
+    Flow(const ByteImage& view, const ByteImage& frame) {
+        cv::buildOpticalFlowPyramid(as_mat(view), view_levels_, kWindow, kFlowLevels);
+        cv::buildOpticalFlowPyramid(as_mat(frame), frame_levels_, kWindow, kFlowLevels);
+    }
+
+    [[nodiscard]] std::vector<FeatureMatch> track(const std::vector<cv::Point2f>& start, int levels) const {
+        std::vector<cv::Point2f> there, home;
+        std::vector<std::uint8_t> found, found_back;
+        std::vector<float> error;
+        const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 0.0005);
+        cv::calcOpticalFlowPyrLK(view_levels_, frame_levels_, start, there, found, error, kWindow, levels, stop);
+        cv::calcOpticalFlowPyrLK(frame_levels_, view_levels_, there, home, found_back, error, kWindow, levels,
+                                 stop);
+        std::vector<FeatureMatch> matches;
+        for (std::size_t i = 0; i < start.size(); ++i) {
+            const cv::Point2f missed = home[i] - start[i];
+            if (found[i] != 0 && found_back[i] != 0 && std::hypot(missed.x, missed.y) < kRoundTrip_px)
+                matches.push_back({start[i].x, start[i].y, there[i].x, there[i].y, i});
+        }
+        return matches;
+    }
+
+private:
+    inline static const cv::Size kWindow{kFlowWindow_px, kFlowWindow_px};
+    std::vector<cv::Mat> view_levels_, frame_levels_;
+};
 
 }  // namespace
 
@@ -65,37 +99,31 @@ SingleThreadedOpenCv::~SingleThreadedOpenCv() {
     cv::setNumThreads(before_);
 }
 
-std::vector<FeatureMatch> match_corners(const ByteImage& view, const ByteImage& frame,
-                                        const std::vector<std::uint8_t>& on_target, int most) {
+CornerMatches match_corners(const ByteImage& view, const ByteImage& frame,
+                            const std::vector<std::uint8_t>& on_target, int most, bool is_near) {
     const cv::Mat mask(view.height, view.width, CV_8U, const_cast<std::uint8_t*>(on_target.data()));
     std::vector<cv::Point2f> corners;
     cv::goodFeaturesToTrack(as_mat(view), corners, most, 0.01, 5, mask, 5);
-    std::vector<Pixel> points;
-    for (const cv::Point2f& c : corners) points.push_back({c.x, c.y});
-    return track_points(view, frame, points);
+    if (corners.empty()) return {};
+    const Flow flow(view, frame);
+    CornerMatches out{flow.track(corners, kFlowLevels)};
+    for (int levels = kFlowLevels - 1; levels >= kFewestFlowLevels; --levels) {
+        if (static_cast<double>(out.matches.size()) >= kEnoughFound * static_cast<double>(corners.size())) break;
+        std::vector<FeatureMatch> found = flow.track(corners, levels);
+        if (static_cast<double>(found.size()) <= kMoreFound * static_cast<double>(out.matches.size())) break;
+        out.coarse_levels_mislead = true;
+        if (!is_near) break;
+        out.matches = std::move(found);
+    }
+    return out;
 }
 
 std::vector<FeatureMatch> track_points(const ByteImage& view, const ByteImage& frame,
                                        std::span<const Pixel> points) {
-    std::vector<FeatureMatch> matches;
-    if (points.empty()) return matches;
-    std::vector<cv::Point2f> start, there, home;
+    if (points.empty()) return {};
+    std::vector<cv::Point2f> start;
     for (const Pixel& p : points) start.emplace_back(static_cast<float>(p.u), static_cast<float>(p.v));
-    std::vector<cv::Mat> view_levels, frame_levels;
-    const cv::Size window(kFlowWindow_px, kFlowWindow_px);
-    cv::buildOpticalFlowPyramid(as_mat(view), view_levels, window, kFlowLevels);
-    cv::buildOpticalFlowPyramid(as_mat(frame), frame_levels, window, kFlowLevels);
-    std::vector<std::uint8_t> found, found_back;
-    std::vector<float> error;
-    const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 0.0005);
-    cv::calcOpticalFlowPyrLK(view_levels, frame_levels, start, there, found, error, window, kFlowLevels, stop);
-    cv::calcOpticalFlowPyrLK(frame_levels, view_levels, there, home, found_back, error, window, kFlowLevels, stop);
-    for (std::size_t i = 0; i < start.size(); ++i) {
-        const cv::Point2f missed = home[i] - start[i];
-        if (found[i] != 0 && found_back[i] != 0 && std::hypot(missed.x, missed.y) < kRoundTrip_px)
-            matches.push_back({start[i].x, start[i].y, there[i].x, there[i].y, i});
-    }
-    return matches;
+    return Flow(view, frame).track(start, kFlowLevels);
 }
 
 UnalignedMatrix<2, 2> flow_covariance(const ByteImage& view, const ByteImage& frame, const FeatureMatch& match) {

@@ -65,10 +65,17 @@ private:
 /// Half the window over which the optical flow sums.
 inline constexpr int kFlowHalfWindow_px = 10;
 
+struct CornerMatches {
+    std::vector<FeatureMatch> matches;
+    /// Without the coarsest levels of the pyramid more corners are found: windows there are as large as the target
+    /// and show what is behind it, which a photograph has and its model has not.
+    bool coarse_levels_mislead = false;
+};
 /// Corners of least eigenvalue (Shi and Tomasi 1994), tracked by pyramidal optical flow (Bouguet 2001) into the
 /// frame and back. `most`: at most so many corners. `on_target`: mask of the view, non-zero where corners may lie.
-[[nodiscard]] std::vector<FeatureMatch> match_corners(const ByteImage& view, const ByteImage& frame,
-                                                      const std::vector<std::uint8_t>& on_target, int most);
+/// `is_near`: the view's pose is nearly right, so that coarse levels may be left out where they mislead.
+[[nodiscard]] CornerMatches match_corners(const ByteImage& view, const ByteImage& frame,
+                                          const std::vector<std::uint8_t>& on_target, int most, bool is_near);
 
 /// The same for given points of the view; those not found are left out.
 [[nodiscard]] std::vector<FeatureMatch> track_points(const ByteImage& view, const ByteImage& frame,

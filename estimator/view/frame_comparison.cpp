@@ -31,6 +31,7 @@ double exceeded_by(double part, std::size_t count, std::vector<double> values) {
 
 /// DN are rounded, so that their median is off by up to half a step: it only serves to select background pixels.
 double black_of(const MeasuredImage& frame, const SensorModel& sensor, const ExpectedFrame& render) {
+    if (!render.knows_background) return sensor.black_dn;
     std::vector<double> background;
     for (std::size_t p = 0; p < frame.dn.size(); ++p)
         if (render.signal[p] == 0 && render.body[p] < 0) background.push_back(static_cast<double>(frame.dn[p]));
@@ -124,7 +125,8 @@ Result<FrameComparison> compare_frame(const MeasuredImage& frame, const SensorMo
     out.black_dn = black_of(frame, sensor, render);
     std::size_t shown = 0;
     for (std::size_t p = 0; p < frame.dn.size(); ++p) {
-        const bool of_another = render.body[p] >= 0 && static_cast<std::size_t>(render.body[p]) != target;
+        const bool of_another =
+            render.body[p] >= 0 ? static_cast<std::size_t>(render.body[p]) != target : !render.knows_background;
         const bool is_clipped = !frame.clipped.empty() && frame.clipped[p] != 0;
         s.frame.push_back(of_another ? 0 : static_cast<double>(frame.dn[p]) - out.black_dn);
         s.render.push_back(of_another ? 0 : static_cast<double>(render.signal[p]));

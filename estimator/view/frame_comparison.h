@@ -19,6 +19,8 @@ struct ExpectedFrame {
     std::vector<std::int32_t> body;  ///< index of the body at each pixel's centre, -1 none (Aovs::body)
     /// Of a frame that was rendered as well: the variance by its samples over `variance`; 0: of a camera.
     double frame_variance_ratio = 0;
+    /// False: the frame may show anything behind the bodies, and only pixels of the target count.
+    bool knows_background = true;
 };
 
 /// With fewer lit pixels nothing is compared.

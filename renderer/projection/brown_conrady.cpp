@@ -8,25 +8,6 @@
 
 namespace narpa {
 
-// Inline, because the compiler does not inline functions that another library may replace, and loops with calls are
-// not vectorised.
-inline BrownConrady::Distorted BrownConrady::distort(double u, double v) const noexcept {
-    const double s = u * u + v * v, uv = u * v;
-    const double above = 1 + s * (c_.k1 + s * (c_.k2 + s * c_.k3)),
-                 below = 1 + s * (c_.k4 + s * (c_.k5 + s * c_.k6));
-    const double L = above / below;
-    const double L_by_s =
-        (c_.k1 + s * (2 * c_.k2 + s * 3 * c_.k3) - L * (c_.k4 + s * (2 * c_.k5 + s * 3 * c_.k6))) / below;
-    const double prism_u = 2 * (c_.s1 + 2 * c_.s2 * s), prism_v = 2 * (c_.s3 + 2 * c_.s4 * s);  // by s, doubled
-    const double cross = 2 * (uv * L_by_s + c_.p1 * u + c_.p2 * v);
-    return {u * L + 2 * c_.p1 * uv + c_.p2 * (s + 2 * u * u) + s * (c_.s1 + s * c_.s2),
-            v * L + c_.p1 * (s + 2 * v * v) + 2 * c_.p2 * uv + s * (c_.s3 + s * c_.s4),
-            L + 2 * u * u * L_by_s + 2 * c_.p1 * v + 6 * c_.p2 * u + prism_u * u,
-            cross + prism_u * v,
-            cross + prism_v * u,
-            L + 2 * v * v * L_by_s + 6 * c_.p1 * v + 2 * c_.p2 * u + prism_v * v};
-}
-
 namespace {
 
 using Model = BrownConrady;
@@ -109,12 +90,14 @@ constinit const ProjectionKind kBrownConrady{.name = "brown_conrady",
                                              .keys = kBrownConradyKeys,
                                              .make = make_model<BrownConrady>};
 
+BrownDistortion BrownDistortion::of(std::span<const double> coefficients) noexcept {
+    const auto at = [&](std::size_t i) { return i < coefficients.size() ? coefficients[i] : 0; };
+    return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), at(10), at(11)};
+}
+
 BrownConrady::BrownConrady(const Pinhole& pinhole, std::span<const double> coefficients)
     : CalibratedModel(kBrownConrady, pinhole, coefficients),
-      c_([&] {
-          const auto at = [&](std::size_t i) { return i < coefficients.size() ? coefficients[i] : 0; };
-          return Coefficients{at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), at(10), at(11)};
-      }()),
+      c_(BrownDistortion::of(coefficients)),
       inverse_(
           kMaxPlane, [&](double r) { return radius(r); }, [&](double r) { return slope(r); }) {}
 

@@ -82,7 +82,7 @@ TEST_F(EstimateBatch, FindsErrorsThatArePutIntoTheModel) {
     refuses("--method marks --camera nav --every 20", "at 2 times, expected at least 4");
     refuses("--start search", "--batch follows the target from frame to frame: expected --start DEG,PERCENT");
     refuses("--method dense", "expected --method features or marks");
-    refuses("--unknowns focus=1", "expected NAME=VALUE with one of scale, focal, centre_px, k1");
+    refuses("--unknowns focus=1", "expected NAME=VALUE with one of scale, focal, aspect, centre_px, k1");
     refuses("--unknowns focal=-1", "expected focal=NUMBER, 0 or more");
     refuses("--model-error focal", "expected NAME=VALUE with one of scale");
     refuses("--path-sigma 1", "expected DEG,METRES above 0");

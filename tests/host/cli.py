@@ -23,6 +23,7 @@ SUBCOMMANDS = {
     "map": ["--camera", "--of", "--body", "--interval", "--datum", "--up", "--time", "--pose", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
     "estimate": ["--frame", "--sweep", "--no-truth", "--uncertainty", "--frame-noise", "--method", "--start"],
+    "calibrate": ["IMAGE", "--trajectory", "--method", "--unknowns", "-o"],
     "compare": ["--frame", "--camera", "--target", "--pose", "-o"],
 }
 BUILD = Path(os.environ["NARPA_BUILD_DIR"])

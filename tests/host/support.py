@@ -89,9 +89,9 @@ def scene_with(folder, pixel_format):
 
 
 def narpa(*arguments, status=0):
-    """Runs narpa and waits for it; fails unless its exit status is `status`. Returns its CompletedProcess."""
+    """Runs narpa and waits for it; fails unless its exit status is `status`, or with None 0 or 1. Returns its CompletedProcess."""
     done = subprocess.run([NARPA, *map(str, arguments)], capture_output=True, timeout=1800)
-    if done.returncode != status:
+    if done.returncode != status and not (status is None and done.returncode in (0, 1)):
         print(done.stderr.decode(errors="replace"))
         expect(False, f"narpa {' '.join(map(str, arguments))} exits with {status}, not {done.returncode}")
     return done

@@ -72,6 +72,12 @@ def estimates():
     return {"frames": frames}
 
 
+def calibration():
+    points = np.column_stack([random.uniform(0, 640, 200), random.uniform(0, 480, 200), random.normal(0, 0.1, (200, 2))])
+    rows = [{"image": f"left{i:02}.jpg", "rms_px": 0.1 + 0.01 * i} for i in range(5)]
+    return {"title": "board: camera cam", "width": 640, "height": 480, "rms_px": 0.14, "points": points.tolist(), "images": rows}
+
+
 def batch():
     states = [{"t_s": 0.5 * k, "rotation_error_rad": 1e-3 * random.lognormal(-1), "position_error_m": 0.01 * random.lognormal(-1),
                "rotation_sigma_rad": 1e-3, "position_sigma_m": 0.01} for k in range(40)]  # fmt: skip
@@ -170,7 +176,7 @@ def surface_map(interval=1.0):
             "lines": [{"level_m": 10.0, "closed": True, "px": circle, "position_m": [[0, 0, 0]] * 40}] if interval == 1 else []}  # fmt: skip
 
 
-DOCUMENTS = {"convergence": convergence, "ladder": ladder, "loop": loop, "estimates": estimates, "batch": batch, "approach": approach,
+DOCUMENTS = {"convergence": convergence, "ladder": ladder, "loop": loop, "estimates": estimates, "batch": batch, "calibration": calibration, "approach": approach,
              "approach_frames": approach_frames, "stereo": stereo, "icp": icp, "filter": filter_, "estimators": estimators,
              "replay": replay, "rehearsal": rehearsal, "campaign": campaign, "map": surface_map, "comparison": comparison}  # fmt: skip
 

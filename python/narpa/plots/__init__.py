@@ -4,7 +4,7 @@ Each document names its kind under the key "plot". For each kind there is a func
 a matplotlib figure, or a dictionary of figures by name. The functions are in the modules of this package:
 
     bench        convergence, ladder, loop: `narpa bench render` and `narpa bench loop`
-    estimation   estimates, batch, approach, approach_frames, stereo, icp, filter, estimators: `narpa estimate`, `bench estimate`;
+    estimation   estimates, batch, calibration, approach, approach_frames, stereo, icp, filter, estimators: `narpa estimate`, `bench estimate`;
                  comparison: `narpa compare`
     replay       replay: `narpa replay --reference`
     rehearsal    rehearsal, campaign: the charts of a rehearsal's page

@@ -61,6 +61,34 @@ def batch(document):
     return drawn
 
 
+def calibration(document):
+    """Residuals of a camera's calibration: over the image, each by itself, and of each image."""
+    drawn = figure(11, 6.2, document["title"])
+    grid = drawn.add_gridspec(2, 2, width_ratios=[1.7, 1], height_ratios=[1, 1])
+    over_image, single, images = (drawn.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1]))
+    u, v, du, dv = np.array(document["points"], float).reshape(-1, 4).T
+    enlarged = 0.05 * document["width"] / max(document["rms_px"], 1e-9) / 2
+    over_image.quiver(u, v, du, dv, color=BLUE, angles="xy", scale_units="xy", scale=1 / enlarged, width=0.0015)
+    over_image.set_xlim(0, document["width"])
+    over_image.set_ylim(document["height"], 0)
+    over_image.set_aspect("equal")
+    over_image.set_title(f"measured minus predicted, {enlarged:.0f} times enlarged", fontsize=9)
+    over_image.set_xlabel("px")
+    most = 1.1 * np.percentile(np.hypot(du, dv), 99) if len(du) else 1
+    single.plot(du, dv, ".", color=BLUE, markersize=2)
+    single.set_xlim(-most, most)
+    single.set_ylim(-most, most)
+    single.set_aspect("equal")
+    single.set_title(f"RMS {document['rms_px']:.3f} px (1 % lie outside)", fontsize=9)
+    single.set_xlabel("right, px")
+    single.set_ylabel("down, px")
+    rows = document["images"]
+    images.bar(range(len(rows)), column(rows, "rms_px"), color=SKY)
+    images.set_xticks(range(len(rows)), [row["image"] for row in rows], rotation=60, ha="right", fontsize=7)
+    images.set_ylabel("RMS, px")
+    return drawn
+
+
 def approach(document):
     """Errors and bounds over range, and the convergence basin: share of poses found over the error of the start."""
     drawn = figure(9.5, 10.5, document["title"])
@@ -244,5 +272,5 @@ def label_points(axes, points):
                       color=colour, fontsize=7.5, arrowprops=arrow)  # fmt: skip
 
 
-KINDS = {"estimates": estimates, "batch": batch, "approach": approach, "approach_frames": approach_frames, "stereo": stereo, "icp": icp,
+KINDS = {"estimates": estimates, "batch": batch, "calibration": calibration, "approach": approach, "approach_frames": approach_frames, "stereo": stereo, "icp": icp,
          "filter": filter_nees, "estimators": estimators, "comparison": comparison}  # fmt: skip

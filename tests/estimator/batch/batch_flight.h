@@ -90,8 +90,10 @@ private:
             seen(in.T_chaser_camera, BatchUnknown::camera_rx, BatchUnknown::camera_x, t_s - late_s(false));
         const double f = 800 * (1 + at(truth, BatchUnknown::focal));
         const BrownConrady camera(
-            {f, f, 319.5 + at(truth, BatchUnknown::centre_x), 239.5 + at(truth, BatchUnknown::centre_y)},
-            std::vector{at(truth, BatchUnknown::k1), at(truth, BatchUnknown::k2), 0.0, 0.0});
+            {f, f * (1 + at(truth, BatchUnknown::aspect)), 319.5 + at(truth, BatchUnknown::centre_x),
+             239.5 + at(truth, BatchUnknown::centre_y)},
+            std::vector{at(truth, BatchUnknown::k1), at(truth, BatchUnknown::k2), at(truth, BatchUnknown::p1),
+                        at(truth, BatchUnknown::p2), at(truth, BatchUnknown::k3)});
         BatchFrame out{time(t_s), inverse(in.T_chaser_camera) * T_chaser_target(t_s), {}};
         const double stated = pixel_noise > 0 ? pixel_noise : 0.1;
         Pixel error{};

@@ -178,7 +178,7 @@ TEST(FlowNoise, ScattersAsPredicted) {
             }
         const ByteScale scale(frame, sensor);
         const ByteImage in_view = scale.scaled(view), in_frame = scale.scaled(frame);
-        const auto matches = match_corners(in_view, in_frame, everywhere, 1);
+        const auto matches = match_corners(in_view, in_frame, everywhere, 1, false).matches;
         ASSERT_EQ(matches.size(), 1u);
         all.push_back(matches[0]);
         mean_u += matches[0].frame_u / kTrials, mean_v += matches[0].frame_v / kTrials;

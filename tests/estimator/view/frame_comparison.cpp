@@ -123,6 +123,20 @@ TEST_F(Comparison, LeavesOutOtherBodiesAndClippedPixels) {
     EXPECT_GT(c.overlap(), 0.99);
 }
 
+/// A photograph shows a room behind the target.
+TEST_F(Comparison, OfTheTargetAloneIgnoresWhatIsBehindIt) {
+    MeasuredImage frame = frame_of(0, 0, 1.2, 20);
+    for (std::size_t p = 0; p < frame.dn.size(); ++p)
+        if (render.body[p] < 0) frame.dn[p] = 1500;
+    render.knows_background = false;
+    const FrameComparison c = compared(frame);
+    EXPECT_NEAR(c.gain, 1.2, 2e-3);
+    EXPECT_EQ(c.black_dn, 20) << "that of the sensor";
+    ASSERT_TRUE(c.correlation);
+    EXPECT_GT(*c.correlation, 0.9999);
+    EXPECT_GT(c.overlap(), 0.99);
+}
+
 /// Bytes of a converter of twelve bits: their background is a number on an edge between two of them.
 TEST_F(Comparison, KnowsTheBlackOfTruncatedNumbers) {
     sensor.black_dn = 64, sensor.rounding_dn2 = 16.0 * 16.0 / 12;

@@ -17,8 +17,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/text/base64.h"
 #include "base/program_beside.h"
+#include "base/text/base64.h"
 #include "base/write_file.h"
 
 namespace narpa {

@@ -67,8 +67,8 @@ public:
     /// DN of the target in light that falls on all of its surfaces alike; the brightest is 1. At the latest
     /// render's pose.
     [[nodiscard]] std::vector<float> ambient_light() const;
-    /// DN of the light that the target's surfaces reflect to each other, by renders with these settings. With ambient
-    /// light, which method path shows as a sky: none in pixels beside dark ones.
+    /// DN of the light that the target's surfaces reflect to each other, by renders with these settings. With
+    /// ambient light, which method path shows as a sky: none in pixels beside dark ones.
     [[nodiscard]] std::vector<float> indirect_light(const Rigid3& T_camera_target, FrameSettings settings);
     /// At the pose of the latest render, for lit pixels.
     void differentiate(const Rigid3& T_camera_target, const FrameSettings& settings, int fineness);

@@ -152,8 +152,8 @@ template <class Square, class Row>
 Square scatter_of_blocks(const PhotometricImages& images, const PixelResiduals& residuals,
                          const Square& information, const Row& row) {
     constexpr int kLeast_px = 8, kBlocksAcross = 4;
-    // The pose follows a part of the details, which the residuals then do not show. Without the factor, NEES was 10 to
-    // 15 for a missing texture, another reflectance and a simplified mesh, and 30 for photographs of a board.
+    // The pose follows a part of the details, which the residuals then do not show. Without the factor, NEES was 10
+    // to 15 for a missing texture, another reflectance and a simplified mesh, and 30 for photographs of a board.
     constexpr double kFollowed = 3;
     const Square zero = Square::Zero(information.rows(), information.cols());
     if (images.detail_dn2 == 0) {

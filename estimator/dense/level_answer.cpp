@@ -31,7 +31,7 @@ void LevelSolver::finish() {
     e_.misfit = loss.excess() / static_cast<double>(std::max<std::size_t>(loss.pixels, 1));
     e_.residual = residual();
     const double off = std::abs(e_.exposure.gain - 1);
-    if (off > kPriorSigmas * images.prior.gain_sigma + kGainOffMin)
+    if (off > kPriorSigmas * images.prior.gain_sigma)
         e_.status = DenseStatus::does_not_fit;
     else
         e_.covariance = covariance_by_response(of_noise, response_to_motions(last), kResponseMax) +
@@ -59,9 +59,7 @@ Matrix6 LevelSolver::response_to_motions(const PhotometricEquations& last) {
     settings_.spp = std::max(2, o_.samples_per_pixel);
     std::vector<float> change(signal.size());
     return response_to_weakest(o, [&](int i, const Vector6& motion) {
-        const double within_limits = kRenderedLimits * std::sqrt(o.eigenvalues[i]);
-        const double sigmas =
-            std::max(std::min(kRendered_sigmas, within_limits), kRendered_px / distance_px(motion));
+        const double sigmas = std::min(kRendered_sigmas, kRenderedLimits * std::sqrt(o.eigenvalues[i]));
         render(displaced(e_.T_camera_body, sigmas * motion));
         std::ranges::copy(view_.images().signal, change.begin());
         render(displaced(e_.T_camera_body, -sigmas * motion));

@@ -94,7 +94,8 @@ void expect_honest(const Answered& a, int good) {
     testing::Test::RecordProperty("answers", a.errors);
 }
 
-/// Triangles a quarter as many: their middles are up to 1.5 % of the radius inside.
+/// A mesh with a quarter of the triangles. Calculated from the curvature of the bumps, it is at most about 1 % of
+/// the radius inside the surface.
 TEST(DenseLackingDetails, ASimplifiedMesh) {
     ModelUncertainty told = kTold;
     told.scale = 0.003, told.mesh_m = 0.003;
@@ -102,7 +103,7 @@ TEST(DenseLackingDetails, ASimplifiedMesh) {
     expect_honest(estimate(body_of(5, grey), body_of(4, grey), told), 4);
 }
 
-/// A sixteenth as many: 5 % of the radius, more than what is told.
+/// A mesh with a sixteenth of the triangles: about 5 % of the radius inside, more than what is told.
 TEST(DenseLackingDetails, AMeshOfAnotherShapeIsRefused) {
     ModelUncertainty told = kTold;
     told.scale = 0.01, told.mesh_m = 0.01;

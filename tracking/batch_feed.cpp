@@ -40,10 +40,12 @@ BatchTime ChaserPath::at(std::int64_t t_ns) const {
 }
 
 Result<std::unique_ptr<BatchFrameFeed>> BatchFrameFeed::create(const World& model, std::size_t camera,
-                                                               const TrackerOptions& options) {
+                                                               const TrackerOptions& options,
+                                                               bool observes_brightness) {
     auto tracker = FrameTracker::create(model, camera, options);
     if (!tracker) return tracker.error();
-    return std::unique_ptr<BatchFrameFeed>(new BatchFrameFeed(model, camera, *std::move(tracker)));
+    return std::unique_ptr<BatchFrameFeed>(
+        new BatchFrameFeed(model, camera, *std::move(tracker), observes_brightness));
 }
 
 void BatchFrameFeed::pass(const FrameLedger& ledger, const World& truth, const BodyPoses& at) {
@@ -59,8 +61,26 @@ void BatchFrameFeed::take(const FrameLedger& ledger, std::span<const std::uint8_
     pass(ledger, truth, at);
     TrackedFrame f = tracker_->take(ledger, bytes, at);
     if (const PointObservations* points = tracker_->points(); points && f.measured)
-        frames_.push_back({{.t_ns = f.t_ns + stamp_late_ns}, *f.measured, *points});
+        frames_.push_back(
+            {{.t_ns = f.t_ns + stamp_late_ns},
+             *f.measured,
+             *points,
+             observes_brightness_ ? brightness(ledger, bytes, at, *f.measured) : BrightnessObservations{}});
     tracked_.push_back(std::move(f));
+}
+
+BrightnessObservations BatchFrameFeed::brightness(const FrameLedger& ledger, std::span<const std::uint8_t> bytes,
+                                                  const BodyPoses& at, const Rigid3& T_camera_target) const {
+    const RenderScene& scene = model_.render_scene();
+    Camera camera = model_.scene().cameras[camera_];
+    if (!set_to_frame(ledger, model_.scene().cameras[camera_], camera)) return {};
+    const auto image = measured_image(camera, bytes);
+    if (!image) return {};
+    const RenderSettings& render = model_.scene().render;
+    FrameSettings settings;
+    settings.spp = tracker_->options().spp, settings.seed = ~tracker_->options().seed;
+    settings.method = render.method, settings.max_depth = render.max_depth;
+    return observe_brightness(scene, camera, tracker_->target(), at, *image, T_camera_target, settings);
 }
 
 void BatchFrameFeed::finish(BatchInput& input) {

@@ -36,8 +36,9 @@ class BatchFrameFeed {
 public:
     /// `model`: the world as the estimator takes it to be. Outlives it. Errors: those of FrameTracker, a method
     /// that finds no points.
+    /// `observes_brightness`: albedo or the light's direction are estimated.
     static Result<std::unique_ptr<BatchFrameFeed>> create(const World& model, std::size_t camera,
-                                                          const TrackerOptions& options);
+                                                          const TrackerOptions& options, bool observes_brightness);
     /// `truth`: the world of the run; `at`: its bodies; `stamp_late_ns`: error of the time stamp.
     void take(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const World& truth,
               const BodyPoses& at, std::int64_t stamp_late_ns);
@@ -48,11 +49,15 @@ public:
     void finish(BatchInput& input);
 
 private:
-    BatchFrameFeed(const World& model, std::size_t camera, std::unique_ptr<FrameTracker> tracker)
-        : model_(model), camera_(camera), tracker_(std::move(tracker)) {}
+    BatchFrameFeed(const World& model, std::size_t camera, std::unique_ptr<FrameTracker> tracker,
+                   bool observes_brightness)
+        : model_(model), camera_(camera), observes_brightness_(observes_brightness), tracker_(std::move(tracker)) {}
+    [[nodiscard]] BrightnessObservations brightness(const FrameLedger& ledger, std::span<const std::uint8_t> bytes,
+                                                    const BodyPoses& at, const Rigid3& T_camera_target) const;
 
     const World& model_;
     std::size_t camera_;
+    bool observes_brightness_;
     std::unique_ptr<FrameTracker> tracker_;
     std::vector<TrackedFrame> tracked_;
     std::vector<BatchFrame> frames_;

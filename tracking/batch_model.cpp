@@ -29,6 +29,28 @@ Status change_projection(const BatchValues& e, Camera& camera, const Scene& scen
     return Ok{};
 }
 
+/// Light as much brighter as the target reflects more of it: exact whatever its materials are.
+void brighten(double factor, Scene& scene) {
+    if (scene.sun) scene.sun->irradiance_w_m2 *= factor;
+    scene.ambient = static_cast<float>(factor) * scene.ambient;
+    for (Light& l : scene.lights) l.emission = static_cast<float>(factor) * l.emission;
+}
+
+/// The model's direction, from which rotations by minus the errors about its own axes lead to the truth.
+Status turn_light(double x_rad, double y_rad, Scene& scene) {
+    if (x_rad == 0 && y_rad == 0) return Ok{};
+    if (!scene.sun) return Error{"a model error of the light's direction is for a scene with a Sun", scene.file};
+    const Vec3 truth = normalized(scene.sun->direction);
+    Vec3 wrong = truth;
+    constexpr int kSteps = 20;
+    for (int i = 0; i < kSteps; ++i) {
+        const auto axes = light_axes(wrong);
+        wrong = exp_rotation(x_rad * axes[0] + y_rad * axes[1]) * truth;
+    }
+    scene.sun->direction = wrong;
+    return Ok{};
+}
+
 /// A sensor without a mount is where the scene puts it: it is then the chaser itself.
 template <class Sensor>
 Status displace(const BatchValues& e, BatchUnknown rotation, BatchUnknown shift, const Sensor& sensor,
@@ -48,6 +70,9 @@ Status apply_model_errors(const BatchValues& e, std::size_t target, Scene& scene
     if (at(e, BatchUnknown::scale) != 0)
         if (Status good = scale_body(1 + at(e, BatchUnknown::scale), scene.bodies[target], scene); !good)
             return good;
+    brighten(1 + at(e, BatchUnknown::albedo), scene);
+    if (Status good = turn_light(at(e, BatchUnknown::light_x), at(e, BatchUnknown::light_y), scene); !good)
+        return good;
     for (Camera& c : scene.cameras) {
         if (Status good = displace(e, BatchUnknown::camera_rx, BatchUnknown::camera_x, c, c.T_mount_camera, scene);
             !good)
@@ -69,7 +94,8 @@ BatchValues expected_of(const BatchValues& error) {
     BatchValues expected;
     for (std::size_t i = 0; i < kBatchUnknowns; ++i) {
         const auto u = static_cast<BatchUnknown>(i);
-        if (u == BatchUnknown::scale || u == BatchUnknown::focal || u == BatchUnknown::aspect)
+        if (u == BatchUnknown::scale || u == BatchUnknown::focal || u == BatchUnknown::aspect ||
+            u == BatchUnknown::albedo)
             expected[i] = 1 / (1 + error[i]) - 1;
         else if (u == BatchUnknown::clock || u == BatchUnknown::range_bias)
             expected[i] = error[i];  // of the data, not of the scene

@@ -114,10 +114,10 @@ nlohmann::json undetermined_json(const BatchResult& r) {
 }
 
 std::string to_text(const BatchResult& r, const BatchTruth& truth) {
-    const auto frames =
-        std::ranges::count_if(r.residuals, [](const auto& f) { return !f.is_sweep && f.points > 0; });
-    const auto sweeps =
-        std::ranges::count_if(r.residuals, [](const auto& f) { return f.is_sweep && f.points > 0; });
+    const auto frames = std::ranges::count_if(
+        r.residuals, [](const auto& f) { return f.measure == BatchMeasure::points && f.points > 0; });
+    const auto sweeps = std::ranges::count_if(
+        r.residuals, [](const auto& f) { return f.measure == BatchMeasure::sweep && f.points > 0; });
     const BatchErrors e = errors_of(r, truth);
     std::string out = fmt::format(
         "{} frames and {} sweeps in one least-squares problem: {} unknowns, {} residuals, {} linearisations{}\n",
@@ -181,8 +181,9 @@ std::string batch_rows(const BatchResult& r, const BatchTruth& truth) {
         auto state = std::ranges::upper_bound(r.states, f.t_ns, {}, &BatchState::t_ns);
         if (state != r.states.begin()) --state;
         const Rigid3& T = state->T_chaser_target;
-        out += fmt::format("{},{},{},{:.6g},{:.6g},{:.4g},{:.6g},{}", f.t_ns, f.is_sweep ? "lidar" : "camera",
-                           f.points, f.rms_start, f.rms, f.downweighted, f.score, f.score_numbers);
+        out += fmt::format("{},{},{},{:.6g},{:.6g},{:.4g},{:.6g},{}", f.t_ns,
+                           kBatchMeasureNames[static_cast<std::size_t>(f.measure)], f.points, f.rms_start, f.rms,
+                           f.downweighted, f.score, f.score_numbers);
         for (const double v : {T.t.x, T.t.y, T.t.z, T.q.w, T.q.x, T.q.y, T.q.z}) out += fmt::format(",{}", v);
         for (int i = 0; i < 6; ++i) out += fmt::format(",{:.6g}", std::sqrt(state->pose_covariance(i, i)));
         const Vector6 error = pose_error(*state, truth);
@@ -207,7 +208,7 @@ Status plot_batch(const std::string& path, const std::string& title, const Batch
     for (const BatchResidual& f : r.residuals)
         if (f.points > 0)
             residuals.push_back({{"t_s", 1e-9 * static_cast<double>(f.t_ns)},
-                                 {"sweep", f.is_sweep},
+                                 {"measure", kBatchMeasureNames[static_cast<std::size_t>(f.measure)]},
                                  {"start", f.rms_start},
                                  {"end", f.rms}});
     return write_plot(path, {{"plot", "batch"},

@@ -121,7 +121,7 @@ private:
                 (!found->answer.usable() && (out_.rounds > kRoundsWithoutRefusal || points.size() < kFewestPoints)))
                 continue;
             view.is_used = true;
-            input_.frames.push_back({{.t_ns = time_of(i)}, found->T_camera_target, points});
+            input_.frames.push_back({{.t_ns = time_of(i)}, found->T_camera_target, points, {}});
         }
     }
     [[nodiscard]] static std::int64_t time_of(std::size_t image) {

@@ -26,6 +26,12 @@ struct BatchPlan {
     BatchValues error{};        ///< of the model
     std::string camera, lidar;  ///< empty: not used
 
+    /// Albedo or the light's direction are unknown.
+    [[nodiscard]] bool observes_brightness() const {
+        const BatchValues& sigma = options.prior_sigma;
+        return at(sigma, BatchUnknown::albedo) > 0 || at(sigma, BatchUnknown::light_x) > 0 ||
+               at(sigma, BatchUnknown::light_y) > 0;
+    }
     [[nodiscard]] std::int64_t stamp_late_ns() const { return std::llround(1e9 * at(error, BatchUnknown::clock)); }
 };
 
@@ -143,7 +149,7 @@ Status track_frames(const BatchPlan& plan, FrameSource& source) {
     const Camera& camera = run.camera();
     const auto model = model_of(plan, run.world(), camera.mount, camera.name, false, source.model);
     if (!model) return model.error();
-    auto feed = BatchFrameFeed::create(**model, run.camera_index(), plan.tracker);
+    auto feed = BatchFrameFeed::create(**model, run.camera_index(), plan.tracker, plan.observes_brightness());
     if (!feed) return feed.error();
     source.feed = *std::move(feed);
     const std::int64_t late_ns = plan.lidar.empty() ? plan.stamp_late_ns() : 0;

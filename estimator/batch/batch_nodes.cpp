@@ -33,24 +33,25 @@ void set_rates(std::vector<BatchNode>& nodes) {
 
 std::vector<BatchObservation> observations_of(const BatchInput& input) {
     std::vector<BatchObservation> all;
-    const auto add = [&](const BatchTime& time, bool is_sweep, std::size_t index, const Rigid3& T,
+    const auto add = [&](const BatchTime& time, BatchMeasure measure, const Rigid3& T,
                          std::unique_ptr<Measurement> measurement) {
+        const bool is_sweep = measure == BatchMeasure::sweep;
         SensorPlace place{is_sweep ? input.T_chaser_lidar : input.T_chaser_camera,
                           time.q_frame_chaser,
                           time.chaser_rate_rad_s,
                           is_sweep ? BatchUnknown::lidar_rx : BatchUnknown::camera_rx,
                           is_sweep ? BatchUnknown::lidar_x : BatchUnknown::camera_x,
                           is_sweep || input.sweeps.empty()};
-        all.push_back({&time, is_sweep, index, T, place, std::move(measurement)});
+        all.push_back({&time, measure, all.size(), T, place, std::move(measurement)});
     };
-    for (std::size_t i = 0; i < input.frames.size(); ++i) {
-        const BatchFrame& f = input.frames[i];
-        add(f.time, false, i, f.T_camera_target, measurement_of(input.camera, f.points));
-    }
-    for (std::size_t i = 0; i < input.sweeps.size(); ++i) {
-        const BatchSweep& s = input.sweeps[i];
-        add(s.time, true, i, s.T_lidar_target, measurement_of(*input.tracer, input.target, input.noise, s.returns));
-    }
+    for (const BatchFrame& f : input.frames)
+        add(f.time, BatchMeasure::points, f.T_camera_target, measurement_of(input.camera, f.points));
+    for (const BatchSweep& s : input.sweeps)
+        add(s.time, BatchMeasure::sweep, s.T_lidar_target,
+            measurement_of(*input.tracer, input.target, input.noise, s.returns));
+    for (const BatchFrame& f : input.frames)
+        if (!f.brightness.blocks.empty())
+            add(f.time, BatchMeasure::brightness, f.T_camera_target, measurement_of(f.brightness));
     std::ranges::stable_sort(all, {}, [](const BatchObservation& o) { return o.time->t_ns; });
     return all;
 }

@@ -11,8 +11,8 @@ namespace narpa {
 /// A frame or sweep with what it measures.
 struct BatchObservation {
     const BatchTime* time = nullptr;
-    bool is_sweep = false;
-    std::size_t index = 0;  ///< in frames or sweeps
+    BatchMeasure measure = BatchMeasure::points;
+    std::size_t index = 0;  ///< in BatchResult::residuals
     Rigid3 T_sensor_target{};
     SensorPlace place;
     std::unique_ptr<Measurement> measurement;

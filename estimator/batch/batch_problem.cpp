@@ -16,7 +16,6 @@ constexpr double kWrong = 5;
 
 BatchProblem::BatchProblem(const BatchInput& input, const BatchOptions& options, const BatchValues& prior_sigma)
     : options_(options),
-      frames_(input.frames.size()),
       shared_(prior_sigma),
       observations_(observations_of(input)),
       nodes_(nodes_of(observations_)),
@@ -35,7 +34,7 @@ void BatchProblem::add_measurement(std::size_t i, bool associates, bool has_loss
     Residuals residuals;
     if (!o.measurement->evaluate(T, values(), residuals)) return;
     score = score_of(*o.measurement, residuals, estimated_columns(*o.measurement, shared_),
-                     o.is_sweep ? options_.sweep_variance : options_.frame_variance);
+                     o.measure == BatchMeasure::sweep ? options_.sweep_variance : options_.frame_variance);
     if (score.whitening.rows() == 0) return;
     const double wrong = kWrong * std::sqrt(static_cast<double>(score.whitening.rows()));
     problem_->AddResidualBlock(measurement_cost(*o.measurement, score, o.place, shared_).release(),
@@ -68,7 +67,7 @@ Status BatchProblem::linearise(bool associates, bool has_loss) {
     std::size_t used = 0;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
         add_measurement(i, associates, has_loss);
-        used += scores_[i].whitening.rows() > 0;
+        used += scores_[i].whitening.rows() > 0 && observations_[i].measurement->has_pose();
     }
     if (rms_start_.empty())
         for (const Score& s : scores_) rms_start_.push_back(s.rms);
@@ -107,8 +106,8 @@ void BatchProblem::report(BatchResult& out) const {
     for (std::size_t i = 0; i < observations_.size(); ++i) {
         const BatchObservation& o = observations_[i];
         const Score& score = scores_[i];
-        BatchResidual& r = out.residuals[o.is_sweep ? frames_ + o.index : o.index];
-        r.t_ns = o.time->t_ns, r.is_sweep = o.is_sweep, r.rms_start = rms_start_[i];
+        BatchResidual& r = out.residuals[o.index];
+        r.t_ns = o.time->t_ns, r.measure = o.measure, r.rms_start = rms_start_[i];
         r.downweighted = score.downweighted, r.score_numbers = static_cast<int>(score.whitening.rows());
         Residuals residuals;
         const Rigid3 T = sensor_view(state(o.node), o.place, values()).T_sensor_target;

@@ -48,7 +48,6 @@ private:
     [[nodiscard]] std::vector<double*> blocks_of(std::size_t node);
 
     const BatchOptions& options_;
-    std::size_t frames_;
     SharedBlock shared_;
     std::vector<BatchObservation> observations_;
     std::vector<BatchNode> nodes_;

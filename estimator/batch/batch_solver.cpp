@@ -37,9 +37,13 @@ Status check(const BatchInput& input, const BatchOptions& options) {
     return Ok{};
 }
 
-/// Unknowns that do not act on the sensors that there are remain known.
+/// Unknowns that do not act on what is measured remain known.
 BatchValues priors_in_use(const BatchInput& input, const BatchOptions& options) {
     BatchValues sigmas = options.prior_sigma;
+    const auto has_brightness = [](const BatchFrame& f) { return !f.brightness.blocks.empty(); };
+    if (std::ranges::none_of(input.frames, has_brightness))
+        for (const BatchUnknown u : {BatchUnknown::albedo, BatchUnknown::light_x, BatchUnknown::light_y})
+            at(sigmas, u) = 0;
     for (std::size_t i = 0; i < kBatchUnknowns; ++i)
         if (!is_of_sensors(batch_unknowns()[i], !input.frames.empty(), !input.sweeps.empty())) sigmas[i] = 0;
     return sigmas;

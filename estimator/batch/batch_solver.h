@@ -9,9 +9,11 @@
 /// linearised and LiDAR points associated again until neither changes the solution.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/batch/measurement.h"
@@ -31,6 +33,7 @@ struct BatchFrame {
     BatchTime time;
     Rigid3 T_camera_target{};  ///< start, by the model
     PointObservations points;
+    BrightnessObservations brightness;  ///< empty: not observed
 };
 struct BatchSweep {
     BatchTime time;
@@ -87,12 +90,15 @@ struct BatchState {
     Rigid3 T_chaser_target{};
     Matrix6 pose_covariance = Matrix6::Zero();  ///< pose_estimate.h, chaser axes
 };
-/// Of one frame or sweep.
+enum class BatchMeasure : std::uint8_t { points, sweep, brightness };
+inline constexpr std::array<std::string_view, 3> kBatchMeasureNames{"camera", "lidar", "brightness"};
+
+/// Of one frame, sweep, or brightness of a frame.
 struct BatchResidual {
     std::int64_t t_ns = 0;
-    bool is_sweep = false;
-    std::size_t points = 0;   ///< 0: not used
-    double rms_start = 0;     ///< of the residuals, px or m, at its own pose by the given model,
+    BatchMeasure measure = BatchMeasure::points;
+    std::size_t points = 0;   ///< or blocks; 0: not used
+    double rms_start = 0;     ///< of the residuals, px, m or part of the mean, at its own pose by the given model,
     double rms = 0;           ///< and at the solution
     double downweighted = 0;  ///< part of the points that are outliers
     double score = 0;         ///< squared length of the whitened score, as many numbers as
@@ -104,7 +110,7 @@ struct BatchResult {
     Eigen::MatrixXd covariance;  ///< of the unknowns, SI, in their order
     std::vector<BatchDirection> undetermined;
     std::vector<BatchState> states;
-    std::vector<BatchResidual> residuals;  ///< frames, then sweeps
+    std::vector<BatchResidual> residuals;  ///< frames, sweeps, brightness of frames
     bool settled = false;
     int linearisations = 0, iterations = 0;  ///< iterations: of Ceres, of all linearisations
     double cost_start = 0, cost = 0;         ///< half the sum of squared residuals

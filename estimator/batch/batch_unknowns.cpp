@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "estimator/pose/pose_estimate.h"
 
 namespace narpa {
@@ -32,6 +34,9 @@ constexpr std::array<BatchUnknownRow, kBatchUnknowns> kBatchRows{{
     {"lidar_mount_m.z", 1, 0.02, false, false, true},
     {"clock_s", 1, 0.05, true, true, true},
     {"range_bias_m", 1, 0.05, true, false, true},
+    {"albedo", 1, 0.1, true, true, false},
+    {"light_deg.x", kDegree, 1, true, true, false},
+    {"light_deg.y", kDegree, 1, true, true, false},
 }};
 
 }  // namespace
@@ -55,6 +60,13 @@ std::string help_of_batch_unknowns() {
                             row.by_default ? "" : " (only if named)");
     }
     return text;
+}
+
+std::array<Vec3, 2> light_axes(const Vec3& direction) {
+    constexpr double kNearPole = 0.866;
+    const Vec3 pole = std::abs(direction.z) < kNearPole ? Vec3{0, 0, 1} : Vec3{1, 0, 0};
+    const Vec3 across = normalized(cross(pole, direction));
+    return {across, normalized(cross(direction, across))};
 }
 
 BatchValues default_batch_priors() {

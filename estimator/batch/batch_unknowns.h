@@ -45,8 +45,11 @@ enum class BatchUnknown : std::uint8_t {
     /// the only sensor.
     clock,
     range_bias,  ///< measured minus true range, m
+    albedo,      ///< of the target's brightness: truth / model - 1
+    light_x,     ///< rotation of the Sun's direction, rad, about light_axes()
+    light_y,     ///
 };
-inline constexpr std::size_t kBatchUnknowns = 24;
+inline constexpr std::size_t kBatchUnknowns = 27;
 
 /// By BatchUnknown; SI units.
 using BatchValues = std::array<double, kBatchUnknowns>;
@@ -75,6 +78,10 @@ struct BatchUnknownRow {
 [[nodiscard]] std::string_view group_of(std::string_view name) noexcept;
 /// Names of the groups with the default standard deviations of those estimated by default, for --help.
 [[nodiscard]] std::string help_of_batch_unknowns();
+
+/// Two unit vectors, perpendicular to each other and to a direction: the first horizontal, unless the direction is
+/// within 30 degrees of the z axis.
+[[nodiscard]] std::array<Vec3, 2> light_axes(const Vec3& direction);
 
 /// Prior standard deviations, SI; 0: known, not estimated.
 [[nodiscard]] BatchValues default_batch_priors();

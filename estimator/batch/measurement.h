@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/batch/batch_unknowns.h"
+#include "estimator/batch/brightness.h"
 #include "estimator/cloud/beam_association.h"
 #include "estimator/pnp/point_observations.h"
 
@@ -31,6 +32,8 @@ public:
     /// False if a point has no image.
     [[nodiscard]] virtual bool evaluate(const Rigid3& T_sensor_target, const BatchValues& unknowns,
                                         Residuals& out) const = 0;
+    /// True if its own pose follows from its residuals; false: only its unknowns do.
+    [[nodiscard]] virtual bool has_pose() const noexcept { return true; }
     /// Covariance of group i: that of the sensor's noise, and that for a scatter of one beyond it.
     [[nodiscard]] virtual Eigen::Matrix2d noise(std::size_t i) const = 0;
     [[nodiscard]] virtual Eigen::Matrix2d beyond(std::size_t i) const = 0;
@@ -53,6 +56,8 @@ public:
 /// Points of a frame. `camera`: by the model.
 [[nodiscard]] std::unique_ptr<Measurement> measurement_of(std::shared_ptr<const CameraModel> camera,
                                                           const PointObservations& points);
+
+[[nodiscard]] std::unique_ptr<Measurement> measurement_of(const BrightnessObservations& brightness);
 
 /// A LiDAR's returns of one sweep, as distances from the model's tangent planes.
 struct SweepObservations {

@@ -9,8 +9,9 @@ namespace {
 
 constexpr double kStudent = 5;
 constexpr double kScatterMax = 1e6;
-/// A pose uses up six degrees of freedom; with fewer than so many left the scatter is not known.
-constexpr double kPose = 6, kFewestFreedom = 3;
+constexpr Eigen::Index kPose = 6;
+/// With fewer degrees of freedom left the scatter is not known.
+constexpr double kFewestFreedom = 3;
 /// Eigenvalues of the score's covariance, scaled to a unit diagonal, below this part of the largest are rounding.
 constexpr double kRankTolerance = 1e-9;
 
@@ -75,21 +76,26 @@ double scatter_of(const Measurement& m, const Residuals& r, double freedom) {
     return high;
 }
 
-/// The residuals about the measurement's own pose: what scatter and weights follow from, so that neither the motion
-/// model nor other measurements make a frame look noisy.
-Residuals about_own_pose(const Measurement& m, const Residuals& r, double freedom) {
+/// Columns of the Jacobian for what the measurement fits alone: its pose, or its unknowns.
+Eigen::MatrixXd own_columns(const Measurement& m, const Eigen::MatrixXd& jacobian) {
+    return m.has_pose() ? jacobian.leftCols(kPose) : jacobian.rightCols(jacobian.cols() - kPose);
+}
+
+/// The residuals about the measurement's own solution: what scatter and weights follow from, so that neither the
+/// motion model nor other measurements make a frame look noisy.
+Residuals about_own_solution(const Measurement& m, const Residuals& r, double freedom) {
     constexpr int kSteps = 3;
     Residuals own = r;
+    const Eigen::MatrixXd columns = own_columns(m, r.jacobian);
     for (int step = 0; step < kSteps; ++step) {
-        const Eigen::MatrixXd pose = r.jacobian.leftCols<6>();
-        const Whitened w(m, own, pose, scatter_of(m, own, freedom));
-        Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
-        Eigen::Matrix<double, 6, 1> pull = Eigen::Matrix<double, 6, 1>::Zero();
+        const Whitened w(m, own, columns, scatter_of(m, own, freedom));
+        Eigen::MatrixXd information = Eigen::MatrixXd::Zero(columns.cols(), columns.cols());
+        Eigen::VectorXd pull = Eigen::VectorXd::Zero(columns.cols());
         for (std::size_t i = 0; i < w.groups(); ++i) {
             information += w.weight(i) * w.X(i).transpose() * w.X(i);
             pull += w.weight(i) * w.X(i).transpose() * w.e(i);
         }
-        own.value -= pose * information.completeOrthogonalDecomposition().solve(pull);
+        own.value -= columns * information.completeOrthogonalDecomposition().solve(pull);
     }
     return own;
 }
@@ -136,23 +142,26 @@ Eigen::MatrixXd inverse_root(const Eigen::MatrixXd& G) {
     return roots.asDiagonal() * eigen.eigenvectors().rightCols(rank).transpose() * scale.asDiagonal();
 }
 
-/// Factor, at least 1, by which the scatter of the pose's score exceeds G: its parts, on squares of the image,
-/// share errors of model and light (clustered residuals: Liang and Zeger 1986), as in ModelMatches::inflation.
+/// Factor, at least 1, by which the scatter of the own columns' score exceeds G: its parts, on squares of the
+/// image, share errors of model and light (clustered residuals: Liang and Zeger 1986), as in
+/// ModelMatches::inflation.
 double part_factor(const Measurement& m, const Whitened& w, const Eigen::MatrixXd& G) {
-    constexpr Eigen::Index kUnknowns = 6;
-    if (m.parts() == 0) return 1;
-    Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(kUnknowns, static_cast<Eigen::Index>(m.parts()));
+    const Eigen::MatrixXd own = own_columns(m, w.X());
+    const Eigen::Index unknowns = own.cols();
+    if (m.parts() == 0 || unknowns == 0) return 1;
+    Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(unknowns, static_cast<Eigen::Index>(m.parts()));
     std::vector<int> members(m.parts());
     for (std::size_t i = 0; i < w.groups(); ++i) {
         pulls.col(static_cast<Eigen::Index>(m.part(i))) +=
-            w.weight(i) * w.X(i).leftCols<kUnknowns>().transpose() * w.e(i);
+            w.weight(i) * own.middleRows(w.row(i), m.dimension()).transpose() * w.e(i);
         ++members[m.part(i)];
     }
     const auto parts = static_cast<double>(std::ranges::count_if(members, [](int n) { return n > 0; }));
-    const double few = parts / std::max(1.0, parts - kUnknowns);
-    const Eigen::Matrix<double, kUnknowns, kUnknowns> scatter = pulls * pulls.transpose(),
-                                                      expected = G.topLeftCorner<kUnknowns, kUnknowns>();
-    return std::max(1.0, few * expected.ldlt().solve(scatter).trace() / kUnknowns);
+    const auto estimated = static_cast<double>(unknowns);
+    const double few = parts / std::max(1.0, parts - estimated);
+    const Eigen::Index first = m.has_pose() ? 0 : kPose;
+    const Eigen::MatrixXd scatter = pulls * pulls.transpose(), expected = G.block(first, first, unknowns, unknowns);
+    return std::max(1.0, few * expected.ldlt().solve(scatter).trace() / estimated);
 }
 
 }  // namespace
@@ -163,11 +172,11 @@ Score score_of(const Measurement& m, const Residuals& at_solution, const std::ve
     const int d = m.dimension();
     const auto n = static_cast<double>(at_solution.value.size());
     if (n > 0) out.rms = std::sqrt(at_solution.value.squaredNorm() * d / n);
-    out.freedom = -kPose;
+    out.freedom = -static_cast<double>(own_columns(m, at_solution.jacobian).cols());
     for (Eigen::Index i = 0; i < at_solution.value.size() / d; ++i)
         out.freedom += m.numbers(static_cast<std::size_t>(i));
     if (!(out.freedom >= kFewestFreedom)) return out;
-    const Residuals r = about_own_pose(m, at_solution, out.freedom);
+    const Residuals r = about_own_solution(m, at_solution, out.freedom);
     const Eigen::MatrixXd jacobian = r.jacobian(Eigen::all, columns);
     // Points that share errors are fewer independent ones.
     if (m.has_shared()) {

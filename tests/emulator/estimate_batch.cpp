@@ -2,6 +2,7 @@
 // model are found, and bad input is refused.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -52,20 +53,23 @@ TEST_F(EstimateBatch, FindsErrorsThatArePutIntoTheModel) {
     const std::string csv = folder_ / "batch.csv";
     const json all = told("--method marks --every 3 --path-sigma 0.001,0.0005 --csv " + csv +
                           " --model-error scale=0.01,focal=-0.01,centre_px.x=2,k1=0.02,camera_mount_deg=0.3,"
-                          "lidar_mount_deg.y=0.3,clock_s=0.02,range_bias_m=0.03");
+                          "lidar_mount_deg.y=0.3,clock_s=0.02,range_bias_m=0.03,albedo=0.1,light_deg.x=-1.5");
     EXPECT_EQ(all["linear_solver"], "SPARSE_NORMAL_CHOLESKY");
     EXPECT_LT(unknown(all, "clock_s")["sigma"].get<double>(), 0.005);
-    for (const char* name :
-         {"scale", "focal", "camera_mount_deg.z", "lidar_mount_deg.y", "clock_s", "range_bias_m"})
+    for (const char* name : {"scale", "focal", "camera_mount_deg.z", "lidar_mount_deg.y", "clock_s", "range_bias_m",
+                             "albedo", "light_deg.x"})
         EXPECT_TRUE(unknown(all, name)["determined"]) << name;
     for (const json& u : all["unknowns"]) EXPECT_LT(u["error_of_sigma"].get<double>(), 4.5) << u["name"];
     EXPECT_NEAR(unknown(all, "scale")["change"].get<double>(), 1 / 1.01 - 1, 0.002);
     EXPECT_NEAR(unknown(all, "lidar_mount_deg.y")["change"].get<double>(), -0.3, 0.05);
+    EXPECT_NEAR(unknown(all, "light_deg.x")["change"].get<double>(), 1.5, 0.3);
+    EXPECT_NEAR(unknown(all, "albedo")["change"].get<double>(), 1 / 1.1 - 1, 0.01);
     EXPECT_NEAR(unknown(all, "clock_s")["truth"].get<double>(), 0.02, 1e-12);
     const auto rows = read_rows(csv);
     ASSERT_GT(rows.size(), 30u);
     EXPECT_EQ(rows.front().at("sensor"), "camera");
-    EXPECT_EQ(rows.back().at("sensor"), "lidar");
+    EXPECT_EQ(rows.back().at("sensor"), "brightness");
+    EXPECT_GT(std::ranges::count_if(rows, [](const auto& row) { return row.at("sensor") == "lidar"; }), 10);
     EXPECT_LT(std::stod(rows.front().at("residual_rms")), 0.5) << "pixels";
 
     // One camera alone tells neither the size nor, over an unknown path, its clock.

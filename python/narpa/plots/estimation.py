@@ -7,6 +7,7 @@ from narpa.plots.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, SKY, VERMIL
 from narpa.plots.style import column, figure, image, logarithmic, positive, show_image
 
 QUANTITIES = (("rotation", "rad", "attitude error, deg", math.degrees(1)), ("position", "m", "position error, m", 1))
+RESIDUALS = (("camera", BLUE, "frames, px"), ("lidar", VERMILION, "sweeps, m"), ("brightness", GREEN, "brightness, part"))
 
 
 def estimates(document):
@@ -39,8 +40,8 @@ def batch(document):
         logarithmic(axes, "y")
         axes.set_ylabel(name)
         axes.legend(ncol=2, loc="lower left", bbox_to_anchor=(0, 1))
-    for of_sweeps, colour, name in ((False, BLUE, "frames, px"), (True, VERMILION, "sweeps, m")):
-        rows = [r for r in document["residuals"] if r["sweep"] == of_sweeps]
+    for measure, colour, name in RESIDUALS:
+        rows = [r for r in document["residuals"] if r["measure"] == measure]
         if not rows:
             continue
         residuals.plot(column(rows, "t_s"), positive(column(rows, "start")), ":", color=colour, label=f"{name}, about own pose")
@@ -48,7 +49,7 @@ def batch(document):
     logarithmic(residuals, "y")
     residuals.set_ylabel("RMS residual")
     residuals.set_xlabel("simulation time, s")
-    residuals.legend(ncol=4, loc="lower left", bbox_to_anchor=(0, 1))
+    residuals.legend(ncol=3, loc="lower left", bbox_to_anchor=(0, 1))
     rows = document["unknowns"]
     unknowns.axhspan(-1, 1, color=GREEN, alpha=0.15, label="prior")
     for i, row in enumerate(rows):

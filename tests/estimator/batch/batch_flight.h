@@ -94,7 +94,7 @@ private:
              239.5 + at(truth, BatchUnknown::centre_y)},
             std::vector{at(truth, BatchUnknown::k1), at(truth, BatchUnknown::k2), at(truth, BatchUnknown::p1),
                         at(truth, BatchUnknown::p2), at(truth, BatchUnknown::k3)});
-        BatchFrame out{time(t_s), inverse(in.T_chaser_camera) * T_chaser_target(t_s), {}};
+        BatchFrame out{time(t_s), inverse(in.T_chaser_camera) * T_chaser_target(t_s), {}, {}};
         const double stated = pixel_noise > 0 ? pixel_noise : 0.1;
         Pixel error{};
         for (std::size_t i = 0; i < points.size(); ++i) {

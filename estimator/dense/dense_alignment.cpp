@@ -176,6 +176,7 @@ bool DenseAlignment::has_independent_noise() const {
 /// the smaller loss, and two of the three starts (with the guess) must lead to it.
 void DenseAlignment::test_by_mirrored_starts(const Measured& m, const Rigid3& guess, const DenseOptions& options,
                                              DenseEstimate& e, Fit& fit) {
+    if (is_near(options, guess, e)) return;
     fit.failed = "no second start leads to the same pose";
     for (int k = 0; k < options.rivals && !fit.failed.empty(); ++k) {
         const Vector6 beyond = std::pow(0.5, k) * error_between(guess, e.T_camera_body);
@@ -188,6 +189,14 @@ void DenseAlignment::test_by_mirrored_starts(const Measured& m, const Rigid3& gu
             descend_and_compare(m, options, other.T_camera_body, e, fit);
     }
     if (fit.failed.empty() && fit.rivals.empty()) test_by_start_near(m, guess, options, e, fit);
+}
+
+/// True if the guess, such as a filter's prediction, lies so near the answer that starts as near test nothing.
+bool DenseAlignment::is_near(const DenseOptions& options, const Rigid3& guess, DenseEstimate& e) {
+    const Camera camera = coarser_camera(camera_, options.finest);
+    LevelView& finest = *levels_[level_number(options.finest)];
+    return LevelSolver(camera, render_scene_, target_, options.finest, finest, options, e)
+        .may_be_same_minimum(error_between(guess, e.T_camera_body));
 }
 
 /// True if steps from the other's coarse result lead to the answer. Adds the variance of the two to the covariance.
@@ -212,16 +221,17 @@ void DenseAlignment::descend_and_compare(const Measured& m, const DenseOptions& 
     DenseEstimate other = descend(m, start, to_finest, options.finest);
     e.renders += other.renders;
     if (other.status != DenseStatus::converged) return;
+    const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
+    if (normalised_error_squared(apart, e.covariance + other.covariance) < kAgree_chi2) {
+        e.covariance += 0.5 * apart * apart.transpose();
+        fit.failed.clear();
+        return;
+    }
     evaluate_losses_on_common_pixels(m, options, e, other);
     keep_better(e, other);
-    const Vector6 apart = error_between(e.T_camera_body, other.T_camera_body);
     const double worse = other.excess_loss - e.excess_loss;
-    const bool agree = normalised_error_squared(apart, e.covariance + other.covariance) < kAgree_chi2;
-    fit.failed = agree || worse < kRival_chi2 ? "" : "two starts lead to different poses";
-    if (agree)
-        e.covariance += 0.5 * apart * apart.transpose();
-    else if (worse < kRival_chi2)
-        fit.rivals.push_back({other.T_camera_body, worse});
+    fit.failed = worse < kRival_chi2 ? "" : "two starts lead to different poses";
+    if (worse < kRival_chi2) fit.rivals.push_back({other.T_camera_body, worse});
 }
 
 /// The coarsest levels may lead both starts away from a pose near the guess, to the same false minimum. So if the

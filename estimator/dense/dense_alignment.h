@@ -139,6 +139,7 @@ private:
     [[nodiscard]] bool has_independent_noise() const;
     void test_by_mirrored_starts(const Measured& m, const Rigid3& guess, const DenseOptions& options,
                                  DenseEstimate& e, Fit& fit);
+    [[nodiscard]] bool is_near(const DenseOptions& options, const Rigid3& guess, DenseEstimate& e);
     [[nodiscard]] bool converges_to(DenseEstimate& e, DenseEstimate& other, const DenseOptions& options);
     void descend_and_compare(const Measured& m, const DenseOptions& options, const Rigid3& start, DenseEstimate& e,
                              Fit& fit);

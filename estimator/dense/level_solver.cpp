@@ -155,9 +155,13 @@ void LevelSolver::differentiate() {
     differentiate(kJacobianValid_px, choosing_ ? kChoiceLines : std::max(1, o_.fineness / kLinesDivisor));
 }
 
+bool LevelSolver::may_be_same_minimum(const Vector6& way) const {
+    return distance_px(way) < kSameMinimum_px;
+}
+
 std::optional<Vector6> LevelSolver::distance_after_steps_to(const Rigid3& T_camera_body) {
     const Vector6 way = error_between(e_.T_camera_body, T_camera_body);
-    if (!(distance_px(way) < kSameMinimum_px)) return {};
+    if (!may_be_same_minimum(way)) return {};
     Vector6 left = way;
     const bool of_few_pixels = !images().chosen.empty();
     for (int k = 0; k < kSameMinimumSteps; ++k) {
@@ -189,7 +193,9 @@ void LevelSolver::evaluate_loss() {
 
 void LevelSolver::linearise_with_many_samples() {
     view_.choose_all();
-    settings_.spp = kLastStepsOfAllPixels.samples * std::max(2, o_.samples_per_pixel);
+    const bool is_large = pixels_of(view_.window()) >= kPixelsOfLargeTarget;
+    settings_.spp =
+        (is_large ? kTestSamplesOfLargeTarget : kLastStepsOfAllPixels.samples) * std::max(2, o_.samples_per_pixel);
     render(e_.T_camera_body);
     differentiate(kJacobianValid_px, std::max(1, o_.fineness / kLinesDivisor));
     measure_noise();

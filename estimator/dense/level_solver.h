@@ -34,6 +34,8 @@ public:
     void finish();
     /// Evaluates the loss at the estimate's pose again, over this view's pixels.
     void evaluate_loss();
+    /// True if a pose this far from the estimate's may belong to one minimum with it.
+    [[nodiscard]] bool may_be_same_minimum(const Vector6& way) const;
     /// Remaining distance to the other pose after steps from the estimate's; empty if they do not lead there or
     /// most of the way, or if the distance exceeds the Jacobian's validity. Computes a Jacobian if the view has
     /// none there.

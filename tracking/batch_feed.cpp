@@ -79,6 +79,7 @@ BrightnessObservations BatchFrameFeed::brightness(const FrameLedger& ledger, std
     const RenderSettings& render = model_.scene().render;
     FrameSettings settings;
     settings.spp = tracker_->options().spp, settings.seed = ~tracker_->options().seed;
+    settings.frame = ledger.frame;  // errors of samples that frames have in common would not average out
     settings.method = render.method, settings.max_depth = render.max_depth;
     return observe_brightness(scene, camera, tracker_->target(), at, *image, T_camera_target, settings);
 }

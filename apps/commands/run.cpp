@@ -4,7 +4,9 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstdint>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
@@ -16,6 +18,7 @@
 #include "base/ready.h"
 #include "base/time.h"
 #include "drivers/lidar/packet_sink.h"
+#include "drivers/service_manager.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/emulator.h"
 #include "emulator/realtime.h"
@@ -97,8 +100,34 @@ private:
     std::jthread watch_;
 };
 
+/// Tells the service manager's watchdog that the run's clock moves, twice as often as it asks for. A run in
+/// lockstep may wait for commands, so its watchdog is fed as long as the program answers at all.
+class Heartbeat {
+public:
+    Heartbeat(const Emulator& emulator, const ServiceManager& manager) {
+        if (!manager.watchdog_ns()) return;
+        const std::chrono::nanoseconds pause(*manager.watchdog_ns() / 2);
+        beats_ = std::jthread([&emulator, &manager, pause](const std::stop_token& stop) {
+            std::mutex mutex;
+            std::condition_variable_any stopped;
+            std::unique_lock lock(mutex);
+            std::int64_t t_ns = emulator.t_ns(), moved_ns = monotonic_ns();
+            do {
+                if (const std::int64_t now_ns = emulator.t_ns(); now_ns != t_ns || emulator.options().lockstep)
+                    t_ns = now_ns, moved_ns = monotonic_ns();
+                if (monotonic_ns() - moved_ns < 2 * pause.count()) manager.notify("WATCHDOG=1");
+            } while (!stopped.wait_for(lock, stop, pause, [&] { return stop.stop_requested(); }));
+        });
+    }
+
+private:
+    std::jthread beats_;
+};
+
 Outcome run(const RunCommandOptions& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
+    const auto manager = ServiceManager::from_environment();
+    if (!manager) return manager.error();
     RunOptions o = options.run;
     if (options.late_max_percent) o.late_max = *options.late_max_percent / 100;
     auto video = options.devices.video(), lidar = options.devices.lidar();
@@ -142,14 +171,17 @@ Outcome run(const RunCommandOptions& options) {
     for (const auto& feed : (*emulator)->observers()) say(feed->observer().description());
 
     notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
+    manager->notify("READY=1");
     bool gave_up = false;
     const Status status = [&] {
         const Patience patience(**emulator, options.patience_s);
+        const Heartbeat heartbeat(**emulator, *manager);
         const Progress progress("running", [&] { return step_of(**emulator); });
         const Status ran = (*emulator)->run(stop_flag());
         gave_up = patience.is_over();
         return ran;
     }();
+    manager->notify("STOPPING=1");
     say(to_text(**emulator));
     if (!status) return status.error();
     if (gave_up)

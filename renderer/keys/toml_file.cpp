@@ -107,9 +107,9 @@ class BasedOnChain {
 public:
     BasedOnChain(std::string head, const TableKeys& keys) : head_(std::move(head)), keys_(keys) {}
 
-    Result<toml::table> parse(const std::string& path, int depth = 0) const {
+    /// `text`: of the file `path`.
+    Result<toml::table> parse(const Result<std::string>& text, const std::string& path, int depth = 0) const {
         constexpr int kDeepest = 8;
-        const auto text = read_file(path);
         if (!text) return text.error();
         if (const Status depth_is_good = check_toml_depth(*text, path); !depth_is_good)
             return depth_is_good.error();
@@ -127,7 +127,7 @@ public:
         if (depth == kDeepest) return wrong("more than eight files one on another");
         const auto file = file_below(path, based_on->as_string()->get());
         if (!file) return wrong(file.error().text());
-        auto base = parse(file->string(), depth + 1);
+        auto base = parse(read_file(file->string()), file->string(), depth + 1);
         if (!base) return base.error();
         if (const auto folder = folder_from(path, *file); !folder.empty()) move_file_names(*base, keys_, folder);
         for (toml::table* const with_head : {&table, &*base})
@@ -213,8 +213,18 @@ std::string beside(const std::string& file, const std::string& named) {
 
 Result<TomlFile> TomlFile::read(const std::string& path, const std::string& head, const TableKeys& keys,
                                 std::span<const std::string> overrides) {
+    return parse(read_file(path), path, head, keys, overrides);
+}
+
+Result<TomlFile> TomlFile::parse(const std::string& text, const std::string& path, const std::string& head,
+                                 const TableKeys& keys, std::span<const std::string> overrides) {
+    return parse(Result<std::string>(text), path, head, keys, overrides);
+}
+
+Result<TomlFile> TomlFile::parse(const Result<std::string>& text, const std::string& path, const std::string& head,
+                                 const TableKeys& keys, std::span<const std::string> overrides) {
     try {
-        auto table = BasedOnChain(head, keys).parse(path);
+        auto table = BasedOnChain(head, keys).parse(text, path);
         if (!table) return table.error();
         for (const std::string& set : overrides)
             if (const Status good = apply_override(set, keys, *table); !good) return good.error();

@@ -28,6 +28,10 @@ public:
     /// outside of `head`. `keys`: of the file.
     static Result<TomlFile> read(const std::string& path, const std::string& head, const TableKeys& keys,
                                  std::span<const std::string> overrides = {});
+    /// The same of a file's text. `path`: the file's name for errors; names of files in the text are relative to
+    /// its folder.
+    static Result<TomlFile> parse(const std::string& text, const std::string& path, const std::string& head,
+                                  const TableKeys& keys, std::span<const std::string> overrides = {});
 
     /// `name` as in "unknown key "x" in NAME". The file outlives the reader.
     [[nodiscard]] TableReader root(std::string name, Problems& problems, const TableKeys* keys = nullptr) const {
@@ -43,6 +47,8 @@ public:
     [[nodiscard]] std::vector<std::string> texts() const;
 
 private:
+    static Result<TomlFile> parse(const Result<std::string>& text, const std::string& path, const std::string& head,
+                                  const TableKeys& keys, std::span<const std::string> overrides);
     explicit TomlFile(std::shared_ptr<const toml::table> table) : table_(std::move(table)) {}
 
     std::shared_ptr<const toml::table> table_;

@@ -50,12 +50,12 @@ void warn_of_dark_materials(Scene& scene) {
     if (scene.render.method == RenderSettings::Method::direct) scene.warnings.push_back(warning);
 }
 
-Result<Scene> read_files(const std::string& path, std::span<const std::string> overrides) {
+Result<Scene> read_files(const Result<TomlFile>& file, const std::string& path,
+                         std::span<const std::string> overrides) {
     SceneReading reading{
         .scene = {}, .problems = Problems(path), .folder = std::filesystem::path(path).parent_path()};
     reading.scene.file = path;
     reading.scene.overrides.assign(overrides.begin(), overrides.end());
-    const auto file = TomlFile::read(path, "scene", kSceneFileKeys, overrides);
     if (!file) {
         Error error = file.error();
         if (error.line > 0 && error.file == path && !path.ends_with(".toml"))
@@ -88,7 +88,16 @@ Status use_method(Scene& scene, RenderSettings::Method method) {
 
 Result<Scene> read_scene(const std::string& path, std::span<const std::string> overrides) {
     try {
-        return read_files(path, overrides);
+        return read_files(TomlFile::read(path, "scene", kSceneFileKeys, overrides), path, overrides);
+    } catch (const std::exception& e) {
+        return Error{.what = fmt::format("cannot be read: {}", e.what()), .file = path};
+    }
+}
+
+Result<Scene> parse_scene(const std::string& text, const std::string& path,
+                          std::span<const std::string> overrides) {
+    try {
+        return read_files(TomlFile::parse(text, path, "scene", kSceneFileKeys, overrides), path, overrides);
     } catch (const std::exception& e) {
         return Error{.what = fmt::format("cannot be read: {}", e.what()), .file = path};
     }

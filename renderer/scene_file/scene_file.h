@@ -17,6 +17,9 @@ extern const TableKeys kSceneFileKeys;
 /// reference is docs/scene.md. Errors carry file, line and column; a key that is not known is an error.
 /// `overrides`: values of single keys, KEY=VALUE (renderer/keys/toml_override.h); the scene remembers them.
 Result<Scene> read_scene(const std::string& path, std::span<const std::string> overrides = {});
+/// The same of a file's text. `path`: its name for errors; names of files in it are relative to its folder.
+Result<Scene> parse_scene(const std::string& text, const std::string& path,
+                          std::span<const std::string> overrides = {});
 
 /// Changes the method of a scene that has been read, and updates its warnings; an error where a material does not
 /// allow the method.

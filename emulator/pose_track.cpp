@@ -33,6 +33,12 @@ Vec3 rotation_between(const Motion& a, const Motion& b, double h) {
 PoseTrack::PoseTrack(const Motion& initial, double stale_after_s)
     : initial_(initial), stale_after_ns_(std::llround(stale_after_s * 1e9)) {}
 
+void PoseTrack::restart(const Motion& initial) noexcept {
+    initial_ = initial;
+    count_ = 0;
+    first_ns_ = newest_ns_ = 0;
+}
+
 void PoseTrack::Slot::store(const Sample& s) noexcept {
     std::array<std::uint64_t, sizeof(Sample) / 8> raw;
     std::memcpy(raw.data(), &s, sizeof s);

@@ -38,6 +38,8 @@ public:
     /// `t_now_ns`: commands older than a second before this may be overwritten.
     TrackStatus push(const PoseCommand& command, std::int64_t t_now_ns) noexcept;
     [[nodiscard]] TrackedPose at(std::int64_t t_ns) const noexcept;
+    /// Forgets all commands. While no other thread uses the track.
+    void restart(const Motion& initial) noexcept;
 
     /// Times of validity of the first and newest command; meaningful when `commanded`.
     [[nodiscard]] bool commanded() const noexcept { return count_.load(std::memory_order_acquire) > 0; }

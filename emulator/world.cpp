@@ -63,6 +63,22 @@ void World::find_moving() {
     }
 }
 
+void World::set_motion(std::size_t body, const Motion& motion) {
+    assert(body < scene_.bodies.size());
+    scene_.bodies[body].initial = motion;
+    scene_.bodies[body].course = nullptr;
+    if (tracks_[body]) tracks_[body]->restart(motion);
+    find_moving();
+}
+
+void World::set_mount(std::size_t camera, int mount, const Rigid3& T_mount_camera) {
+    assert(camera < scene_.cameras.size() && mount < static_cast<int>(scene_.bodies.size()));
+    Camera& c = scene_.cameras[camera];
+    c.mount = mount;
+    c.T_mount_camera = T_mount_camera;
+    c.course = nullptr;
+}
+
 Status World::load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns) {
     std::vector<const TrajectoryRow*> before(scene_.bodies.size(), nullptr);
     std::vector<bool> past_end(scene_.bodies.size(), false), is_new(scene_.bodies.size(), false);

@@ -41,6 +41,15 @@ public:
     /// Other bodies keep the scene's own motion. A later call replaces the commands of the bodies that it names.
     Status load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_ns, std::int64_t t_to_ns);
 
+    // Changes of the scene between frames, while no other thread uses the world.
+
+    /// The body's motion from time 0 on, in place of its own, its course and its commands.
+    void set_motion(std::size_t body, const Motion& motion);
+    /// Where a camera is from now on: on a body, or on the world (-1). For later units; CameraUnit::set_mount.
+    void set_mount(std::size_t camera, int mount, const Rigid3& T_mount_camera);
+    /// Settings of later frames.
+    void set_render(const RenderSettings& settings) noexcept { scene_.render = settings; }
+
     /// Computes every body's pose at t. `rider`: the body whose command the returned source names, if it has one (a
     /// sensor's mount); -1 for none. `motions`: receives the bodies' motions, up to its length; a later call may
     /// use newer commands. Allocates nothing.

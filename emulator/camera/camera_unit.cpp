@@ -48,7 +48,8 @@ CameraUnit::CameraUnit(const World& world, std::size_t index)
       starts_(camera_.shutter ? motions_.size() : 0),
       ends_(starts_.size()),
       renderer_(world.render_scene(), camera_),
-      sensor_array_(SensorArray::create(camera_, world.scene().render.seed)),
+      array_seed_(world.scene().render.seed),
+      sensor_array_(SensorArray::create(camera_, array_seed_)),
       radiance_(camera_.width, camera_.height),
       bytes_(frame_bytes(format())) {
     if (camera_.control) set(settings_, 0);  // whole nanoseconds, as logs have them
@@ -63,6 +64,12 @@ void CameraUnit::set(const CameraSettings& settings, std::uint8_t command_counte
     command_counter_ = command_counter;
     apply(settings, world_.scene().cameras[index_], camera_);
     full_scale_ = full_scale_radiance(camera_);
+}
+
+void CameraUnit::set_mount(int mount, const Rigid3& T_mount_camera) noexcept {
+    camera_.mount = mount;
+    camera_.T_mount_camera = T_mount_camera;
+    camera_.course = nullptr;
 }
 
 FrameBudget CameraUnit::budget(std::int64_t deadline_ns) const noexcept {
@@ -129,6 +136,10 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     t_radiance_ns_ = monotonic_ns();
     durations_.radiance_ns = t_radiance_ns_ - begun_ns;
     const std::int64_t lit_ns = t_radiance_ns_;
+    if (render.seed != array_seed_) {  // World::set_render
+        array_seed_ = render.seed;
+        sensor_array_ = SensorArray::create(camera_, array_seed_);
+    }
     // The allowance includes the time by which the renderer stopped late, unless no less could be done.
     if (account.timed && !account.coarsest_late)
         t_radiance_ns_ = std::min(t_radiance_ns_, settings.budget.deadline_ns);

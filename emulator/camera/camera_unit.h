@@ -70,6 +70,8 @@ public:
                        Aovs* aovs = nullptr, std::atomic<std::size_t>* pixels_done = nullptr);
     /// Settings of all later frames. Only for a camera that is operated (Camera::control).
     void set(const CameraSettings& settings, std::uint8_t command_counter) noexcept;
+    /// Where the camera is in all later frames: World::set_mount.
+    void set_mount(int mount, const Rigid3& T_mount_camera) noexcept;
     [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
     [[nodiscard]] std::uint8_t command_counter() const noexcept { return command_counter_; }
     /// Renders a frame of maximum work and discards it: triggers one-time allocations and calibrates the renderer.
@@ -105,6 +107,7 @@ private:
     BodyPoses placement_;
     std::vector<Motion> motions_, starts_, ends_;
     CameraRenderer renderer_;
+    std::uint64_t array_seed_;                   ///< of sensor_array_
     std::unique_ptr<SensorArray> sensor_array_;  ///< null where the scene names none
     RadianceImage radiance_;
     Allowance allowance_;

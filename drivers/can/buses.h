@@ -23,6 +23,8 @@ CanBusResult open_udp_multicast(const std::string& group, CanRole role);
 /// A USB-CAN adapter through libusb. `text`: drivers/can/usb_spec.h. A missing one is an error; one that is pulled
 /// out later is looked for once a second.
 CanBusResult open_gs_usb(const std::string& text, CanRole role);
+/// Within one process. The client opens it first, then the hub: a hub without a client is an error.
+CanBusResult open_memory_bus(const std::string& name, CanRole role);
 /// A hub reads the log, a client writes it.
 CanBusResult open_candump(const std::string& path, CanRole role);
 

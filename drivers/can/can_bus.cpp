@@ -26,6 +26,7 @@ constexpr std::array kBuses{
     CanBusKind{{"udp:", "udp:GROUP", "udp:239.74.163.2 (multicast on this machine)"}, open_udp_multicast},
     CanBusKind{{"usb:", "usb:[ADAPTER]", "usb:[ADAPTER][/CHANNEL][@BIT_RATE[,DATA_BIT_RATE]] (a gs_usb adapter)"},
                open_gs_usb},
+    CanBusKind{{"memory:", "memory:NAME", "memory:NAME (within one process: the Python package)"}, open_memory_bus},
     CanBusKind{{"log:", "log:FILE", "log:FILE[:INTERFACE] (a candump log)"}, open_candump},
 };
 constexpr std::span<const CanBusKind> kBusTable{kBuses};

@@ -1,4 +1,5 @@
-/// drivers/can/can_bus.h - the interface of every CAN bus: SocketCAN, slcan, UDP multicast, USB adapters, logs.
+/// drivers/can/can_bus.h - the interface of every CAN bus: SocketCAN, slcan, UDP multicast, USB adapters, memory,
+/// logs.
 ///
 /// Nothing here blocks, allocates or throws after `open_can_bus`. Frames that cannot be sent or stored are dropped
 /// and counted. A bus that goes away (interface down, client gone) is reopened when it is back.

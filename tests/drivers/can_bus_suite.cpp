@@ -72,6 +72,15 @@ Pair udp() {
     return p;
 }
 
+Pair memory() {
+    static int opened = 0;
+    const std::string spec = "memory:suite-" + std::to_string(opened++);
+    Pair p;
+    p.peer = open_or_fail(spec, CanRole::client);
+    p.hub = open_or_fail(spec, CanRole::hub);
+    return p;
+}
+
 Pair socketcan() {
     const char* interface = std::getenv("NARPA_TEST_CAN");
     if (interface == nullptr) return {nullptr, nullptr, "NARPA_TEST_CAN names no CAN interface"};
@@ -252,8 +261,8 @@ TEST_P(CanBusSuite, ThePeerComesAndGoes) {
 
 INSTANTIATE_TEST_SUITE_P(Buses, CanBusSuite,
                          testing::Values(Kind{"slcan_tcp", slcan_tcp, true}, Kind{"slcan_pty", slcan_pty, true},
-                                         Kind{"udp_multicast", udp, false}, Kind{"socketcan", socketcan, true},
-                                         Kind{"usb", usb, true, true}),
+                                         Kind{"udp_multicast", udp, false}, Kind{"memory", memory, true},
+                                         Kind{"socketcan", socketcan, true}, Kind{"usb", usb, true, true}),
                          [](const auto& kind) { return std::string(kind.param.name); });
 
 }  // namespace

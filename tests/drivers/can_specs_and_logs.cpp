@@ -24,6 +24,17 @@ Error error_of(const std::string& spec, CanRole role = CanRole::hub) {
     return bus ? Error{} : bus.error();
 }
 
+TEST(MemoryBus, AHubNeedsAClientOfItsName) {
+    const auto alone = open_can_bus("memory:specs", CanRole::hub);
+    ASSERT_FALSE(alone);
+    EXPECT_NE(alone.error().what.find("within this process"), std::string::npos) << alone.error().what;
+    const auto client = open_can_bus("memory:specs", CanRole::client);
+    ASSERT_TRUE(client);
+    EXPECT_FALSE(open_can_bus("memory:specs", CanRole::client)) << "the name is taken";
+    EXPECT_TRUE(open_can_bus("memory:specs", CanRole::hub));
+    EXPECT_FALSE(open_can_bus("memory:specs", CanRole::hub)) << "it has a hub";
+}
+
 TEST(CanSpec, BadTextsAreBadInput) {
     for (const char* spec :
          {"", "usb:x/300", "usb:@5", "usb:@500000,100000", "usb:a b", "vcan:0", "slcan:", "slcan:70000", "slcan:-1",

@@ -187,6 +187,10 @@ void Emulator::note_losses() {
 Status Emulator::run(const StopFlag& stop) {
     options_.lockstep ? run_lockstep(stop) : run_real_time(stop);
     stopped_ = stop.load(std::memory_order_relaxed);
+    return finish();
+}
+
+Status Emulator::finish() {
     if (no_priority_ || threads_->refused())
         notices_.push_back("no real-time priority (not permitted): wake-ups may be late under load");
     note_losses();

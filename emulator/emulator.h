@@ -28,6 +28,15 @@ public:
     /// first error of a file that could not be written.
     Status run(const StopFlag& stop);
 
+    // A run in lockstep that the caller drives, in place of `run`: it has the other side of the bus, which is
+    // within the process (memory:NAME). `begin`, then `advance` after each command that it sends, then `end`.
+
+    void begin();
+    /// Takes the frames that wait on the bus, then makes the items for which poses are commanded, up to `until_ns`.
+    void advance(std::int64_t until_ns, const StopFlag& stop);
+    /// As the end of `run`.
+    Status end();
+
     [[nodiscard]] const World& world() const noexcept { return *world_; }
     [[nodiscard]] CanNode* can() noexcept { return can_.get(); }
     [[nodiscard]] const CanNode* can() const noexcept { return can_.get(); }
@@ -54,6 +63,12 @@ public:
 
 private:
     struct RealTimeRun;
+    struct LockstepRun {
+        LockstepClock clock{};
+        bool started = false;  ///< every commanded body has a command
+        bool moved = false;    ///< the last frame completed a command
+        bool refused = false;  ///< the user has been told of refused commands
+    };
 
     Emulator();
     Status open();
@@ -78,7 +93,13 @@ private:
     void note_losses();
 
     void run_lockstep(const StopFlag& stop);
+    /// Takes a frame from the bus. False: none waits.
+    bool take_frame();
+    /// Makes the items for which poses are commanded, up to `until_ns`.
+    void make_items(std::int64_t until_ns, const StopFlag& stop);
     void advance_to(std::int64_t t_ns, LockstepClock& clock, const StopFlag& stop);
+    /// Flushes everything; the first error of a file.
+    Status finish();
 
     RunOptions options_;
     std::int64_t end_ns_ = Clock::kNever;  ///< of the simulation clock
@@ -92,6 +113,7 @@ private:
     Heartbeat faults_{};  ///< since the last heartbeat
     std::uint64_t drops_reported_ = 0;
     std::unique_ptr<TracingThreads> threads_;
+    LockstepRun lockstep_{};
     std::atomic<std::int64_t> t_ns_{0};
     std::atomic<bool> no_priority_{false};
     PageFaults page_faults_{};

@@ -178,19 +178,21 @@ void Emulator::run_observer(FrameFeed& feed, const StopFlag& stop) {
 
 // --- Lockstep ------------------------------------------------------------
 
-void Emulator::run_lockstep(const StopFlag& stop) {
-    LockstepClock clock;
-    clock.end_at(end_ns_);
-    bool started = false, moved = false, refused = false;
-    int waits_alone = 0;
+void Emulator::begin() {
+    lockstep_.clock.end_at(end_ns_);
     send_heartbeat(0, RunState::starting);
+}
+
+void Emulator::run_lockstep(const StopFlag& stop) {
+    begin();
+    int waits_alone = 0;
     std::int64_t repeated_ns = monotonic_ns();
     while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
-        if (!started && monotonic_ns() - repeated_ns > kStartingPeriodNs) {
+        if (!lockstep_.started && monotonic_ns() - repeated_ns > kStartingPeriodNs) {
             can_->repeat_heartbeat();
             repeated_ns = monotonic_ns();
         }
-        if (!can_->receive(t_ns(), moved)) {
+        if (!take_frame()) {
             if (can_->bus().ended()) break;
             const bool left = can_->hub() && can_->hub()->commanders_left();
             waits_alone = left ? waits_alone + 1 : 0;
@@ -202,18 +204,39 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             can_->bus().wait(kLockstepWaitNs);
             continue;
         }
-        if (can_->refuses_poses() && !std::exchange(refused, true)) {
-            PoseRefusals refusals;
-            can_->refusals(refusals);
-            report_refusals(refusals);
-        }
-        if (!moved || !can_->commanded()) continue;
-        if (!std::exchange(started, true))
-            for (const auto& sensor : sensors_.all) sensor->start_at(can_->first_ns());
-        advance_to(std::min(can_->granted_ns(), end_ns_), clock, stop);
-        send_heartbeat(t_ns(), RunState::lockstep);
+        make_items(Clock::kNever, stop);
     }
     send_heartbeat(t_ns(), RunState::stopping);
+}
+
+void Emulator::advance(std::int64_t until_ns, const StopFlag& stop) {
+    while (!stop.load(std::memory_order_relaxed) && take_frame()) {
+    }
+    lockstep_.moved = true;  // an earlier command may reach beyond the last `until_ns`
+    make_items(until_ns, stop);
+}
+
+Status Emulator::end() {
+    send_heartbeat(t_ns(), RunState::stopping);
+    return finish();
+}
+
+bool Emulator::take_frame() {
+    if (!can_->receive(t_ns(), lockstep_.moved)) return false;
+    if (can_->refuses_poses() && !std::exchange(lockstep_.refused, true)) {
+        PoseRefusals refusals;
+        can_->refusals(refusals);
+        report_refusals(refusals);
+    }
+    return true;
+}
+
+void Emulator::make_items(std::int64_t until_ns, const StopFlag& stop) {
+    if (!lockstep_.moved || !can_->commanded()) return;
+    if (!std::exchange(lockstep_.started, true))
+        for (const auto& sensor : sensors_.all) sensor->start_at(can_->first_ns());
+    advance_to(std::min({can_->granted_ns(), end_ns_, until_ns}), lockstep_.clock, stop);
+    send_heartbeat(t_ns(), RunState::lockstep);
 }
 
 /// Makes every item whose poses are commanded by `t_ns`, in the order of time.

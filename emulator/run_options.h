@@ -1,6 +1,7 @@
 /// emulator/run_options.h - what a run of the emulator is made of, beside its scene.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -10,6 +11,8 @@
 #include "emulator/frame_observer.h"
 
 namespace narpa {
+
+class LidarUnit;
 
 struct RunOptions {
     std::string bus;                                                ///< BUS; empty: no commands
@@ -21,7 +24,10 @@ struct RunOptions {
     std::optional<double> late_max{};  ///< part of a camera's frames that may be late or skipped; empty: any
     int threads = 0;                   ///< tracing threads; 0: one per core, or one per entry of `cpus`
     std::vector<int> cpus;             ///< processors that tracing threads are bound to in real time; empty: any
-    std::vector<OpenFrameObserver> observers{};            ///< of names that differ; several may share a camera
+    std::vector<OpenFrameObserver> observers{};  ///< of names that differ; several may share a camera
+    /// In lockstep, of each packet that a LiDAR has just fired, which then also computes the truth of its shots;
+    /// from the loop, which waits.
+    std::function<void(const LidarUnit& unit, std::int64_t packet)> on_packet{};
     std::function<void(const std::string&)> on_refusal{};  ///< once, when CanNode::refuses_poses, during the run
 };
 

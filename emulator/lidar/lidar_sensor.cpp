@@ -28,7 +28,7 @@ Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
         });
         if (!sinks) return sinks.error();
         if (sinks->empty() && !beams) continue;
-        auto sensor = std::make_unique<LidarSensor>(world, i, *std::move(sinks), o.log_shots);
+        auto sensor = std::make_unique<LidarSensor>(world, i, *std::move(sinks), o.log_shots, o.on_packet);
         if (beams) sensor->keep_beams();
         out.lidars.push_back(sensor.get());
         out.all.push_back(std::move(sensor));
@@ -37,11 +37,15 @@ Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
 }
 
 LidarSensor::LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
-                         bool truth)
-    : lidar_(static_cast<std::uint8_t>(lidar)), unit_(world, lidar, truth), sinks_(std::move(sinks)) {}
+                         bool log_shots, OnPacket on_packet)
+    : lidar_(static_cast<std::uint8_t>(lidar)),
+      unit_(world, lidar, log_shots || on_packet),
+      sinks_(std::move(sinks)),
+      logs_shots_(log_shots),
+      on_packet_(std::move(on_packet)) {}
 
 Status LidarSensor::log_to(const std::string& folder, bool wait_when_full) {
-    auto log = SweepLog::create(folder, unit_.lidar().name, !unit_.truth().empty(), wait_when_full);
+    auto log = SweepLog::create(folder, unit_.lidar().name, logs_shots_, wait_when_full);
     if (!log) return log.error();
     log_ = *std::move(log);
     return Ok{};
@@ -72,6 +76,7 @@ void LidarSensor::make_next(const Clock& clock) {
     const bool late = now > due + unit_.packet_period_ns();
     stats_.late += late ? 1 : 0;
     if (keeps_beams_) report_beams();
+    if (on_packet_) on_packet_(unit_, next_);
     if (log_) log_->add(unit_, next_, due, now, late, lost());
     ++next_;
     if (due_ns() + kMaxLagNs < now) {  // skip what is long overdue rather than send it in a burst

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -27,9 +28,10 @@ struct LidarStats {
 
 class LidarSensor final : public Sensor {
 public:
-    /// `truth`: for the log, of each shot.
+    using OnPacket = std::function<void(const LidarUnit&, std::int64_t packet)>;
+    /// `log_shots`, `on_packet`: RunOptions; both need the truth of each shot.
     LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
-                bool truth = false);
+                bool log_shots = false, OnPacket on_packet = {});
 
     /// Keeps each shot's report for send_telemetry. At most kMaxBeams_hz shots a second.
     void keep_beams() noexcept { keeps_beams_ = true; }
@@ -39,7 +41,7 @@ public:
     [[nodiscard]] std::string_view name() const noexcept override { return unit_.lidar().name; }
     [[nodiscard]] SensorThread thread() const noexcept override { return {"narpa-lidar", 55, false}; }
     [[nodiscard]] std::vector<std::string> outputs() const override;
-    /// Sweeps, and shots where it was made with `truth`.
+    /// Sweeps, and shots where it was made to log them.
     Status log_to(const std::string& folder, bool wait_when_full) override;
     void start_at(std::int64_t t_ns) noexcept override;
     /// All shots of the packet come before it is complete.
@@ -74,6 +76,8 @@ private:
     std::int64_t next_ = 0;
     LidarStats stats_;
     std::unique_ptr<SweepLog> log_;  ///< null without a log
+    bool logs_shots_;
+    OnPacket on_packet_;
     bool keeps_beams_ = false;
     SpscRing<LidarBeamReport, 1024> beams_;
     std::uint64_t beams_lost_ = 0;  ///< the CAN thread did not keep up

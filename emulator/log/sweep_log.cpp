@@ -56,18 +56,36 @@ Result<std::vector<LoggedSweep>> read_sweep_log(const std::string& path) {
     return sweeps;
 }
 
-std::size_t format_shot_row(std::span<char> out, const LidarUnit& unit, std::int64_t packet,
-                            std::size_t i) noexcept {
+ShotRow shot_row(const LidarUnit& unit, std::int64_t packet, std::size_t i) noexcept {
     const LidarShot& s = unit.shots()[i];
     const LidarReturn& r = unit.truth()[i];
     const auto [first, second] = unit.echoes()[i].reported(unit.spec().returns);
-    const Vec3 p = s.origin_m + r.range_m * s.direction;
-    const double incidence_rad = std::acos(std::clamp(static_cast<double>(r.cos_incidence), 0.0, 1.0));
-    return format_row(out, "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-                      unit.packet_start_ns(packet) + s.t_offset_ns, packet, s.block, s.beam, s.azimuth_rad,
-                      s.elevation_rad, r.range_m, p.x, p.y, p.z, r.reflectivity, r.range_m > 0 ? r.body : -1,
-                      incidence_rad, r.velocity_m_s, first.range_m, first.reflectivity, first.velocity_m_s,
-                      second.range_m, second.reflectivity);
+    return {.t_ns = unit.packet_start_ns(packet) + s.t_offset_ns,
+            .packet = packet,
+            .block = s.block,
+            .laser = s.beam,
+            .azimuth_rad = s.azimuth_rad,
+            .elevation_rad = s.elevation_rad,
+            .range_m = r.range_m,
+            .position_m = s.origin_m + r.range_m * s.direction,
+            .reflectivity = r.reflectivity,
+            .body = r.range_m > 0 ? r.body : -1,
+            .incidence_rad = std::acos(std::clamp(static_cast<double>(r.cos_incidence), 0.0, 1.0)),
+            .velocity_m_s = r.velocity_m_s,
+            .reported_range_m = first.range_m,
+            .reported_reflectivity = first.reflectivity,
+            .reported_velocity_m_s = first.velocity_m_s,
+            .second_range_m = second.range_m,
+            .second_reflectivity = second.reflectivity};
+}
+
+std::size_t format_shot_row(std::span<char> out, const LidarUnit& unit, std::int64_t packet,
+                            std::size_t i) noexcept {
+    const ShotRow s = shot_row(unit, packet, i);
+    return format_row(out, "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", s.t_ns, s.packet, s.block,
+                      s.laser, s.azimuth_rad, s.elevation_rad, s.range_m, s.position_m.x, s.position_m.y,
+                      s.position_m.z, s.reflectivity, s.body, s.incidence_rad, s.velocity_m_s, s.reported_range_m,
+                      s.reported_reflectivity, s.reported_velocity_m_s, s.second_range_m, s.second_reflectivity);
 }
 
 Result<std::unique_ptr<SweepLog>> SweepLog::create(const std::string& folder, const std::string& lidar, bool shots,

@@ -42,8 +42,26 @@ struct LoggedSweep {
 /// Reads the LIDAR.sweeps.csv of one LiDAR. Errors name file, line and column.
 Result<std::vector<LoggedSweep>> read_sweep_log(const std::string& path);
 
-/// Header of LIDAR.shots.csv and of `narpa scan -o FILE.csv`: the truth of the beam's axis, then what the packets
-/// state of it, before rounding.
+/// A shot: the truth of the beam's axis, then what the packets state of it, before rounding.
+struct ShotRow {
+    std::int64_t t_ns = 0, packet = 0;  ///< simulation clock; number of the packet
+    int block = 0, laser = 0;
+    double azimuth_rad = 0, elevation_rad = 0;
+    double range_m = 0;  ///< 0: the axis meets nothing
+    Vec3 position_m{};   ///< LiDAR axes
+    float reflectivity = 0;
+    int body = -1;  ///< -1: none
+    double incidence_rad = 0, velocity_m_s = 0;
+    double reported_range_m = 0;  ///< 0: no return
+    float reported_reflectivity = 0;
+    double reported_velocity_m_s = 0;
+    double second_range_m = 0;
+    float second_reflectivity = 0;
+};
+/// Of shot i of the packet that the unit, made with `truth`, has just fired.
+[[nodiscard]] ShotRow shot_row(const LidarUnit& unit, std::int64_t packet, std::size_t i) noexcept;
+
+/// Header of LIDAR.shots.csv and of `narpa scan -o FILE.csv`: ShotRow.
 inline constexpr std::string_view kShotHeader =
     "t_ns,packet,block,laser,azimuth_rad,elevation_rad,range_m,x_m,y_m,z_m,reflectivity,body,incidence_rad,"
     "velocity_m_s,reported_range_m,reported_reflectivity,reported_velocity_m_s,second_range_m,second_"

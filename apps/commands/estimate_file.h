@@ -9,8 +9,7 @@
 #include "apps/cli.h"
 #include "apps/scene_options.h"
 #include "emulator/world.h"
-#include "protocols/ledger.h"
-#include "tracking/target_tracker.h"
+#include "tracking/single_estimate.h"
 
 namespace narpa::cli {
 
@@ -29,23 +28,15 @@ struct FileEstimate {
     int threads = 0;
 };
 
-[[nodiscard]] Outcome estimate_frame(const FileEstimate& file, TrackerOptions options);
+[[nodiscard]] Outcome estimate_frame(const FileEstimate& file, const TrackerOptions& options);
 [[nodiscard]] Outcome estimate_sweep(const FileEstimate& file, const TrackerOptions& options);
 
 /// The world between two times, as the scene and the poses have it.
 [[nodiscard]] Result<std::unique_ptr<World>> world_of(const FileEstimate& file, std::int64_t t_ns,
                                                       std::int64_t until_ns);
-/// Ledger of a frame with the exposure of the scene.
-[[nodiscard]] FrameLedger nominal_ledger(const Camera& camera, std::int64_t t_ns);
 /// The frame's bytes in the camera's format. Errors: a file that is not one of this camera.
 [[nodiscard]] Result<std::vector<std::uint8_t>> frame_of(const std::string& path, const Camera& camera);
 
-/// Target and sensor of an estimate, and the pose that it is compared with.
-struct EstimatedPose {
-    std::string target, sensor, sensor_kind;  ///< the last: "camera" or "lidar"
-    Rigid3 T_world_sensor{}, known{};         ///< `known`: T_sensor_target, the truth or the guess
-    bool known_is_guess = false;
-};
 /// Prints an estimate beside the truth or the guess. Returns the document; `passed` if the pose is usable.
 [[nodiscard]] nlohmann::json show(const EstimatedPose& of, const Rigid3& T, const Matrix6& covariance,
                                   const Matrix6& bound, const Answer& answer);

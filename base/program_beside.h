@@ -5,11 +5,28 @@
 #include <filesystem>
 #include <sstream>
 #include <string>
+#include <utility>
 
 namespace narpa {
 
-/// The folder of the running program.
+namespace detail {
+
+inline std::filesystem::path& stated_program_folder() {
+    static std::filesystem::path folder;
+    return folder;
+}
+
+}  // namespace detail
+
+/// Where narpa's programs are, for a library in a program of another folder (Python). Call before other threads
+/// start.
+inline void use_program_folder(std::filesystem::path folder) {
+    detail::stated_program_folder() = std::move(folder);
+}
+
+/// The folder of the running program, or the one that was stated.
 [[nodiscard]] inline std::filesystem::path program_folder() {
+    if (!detail::stated_program_folder().empty()) return detail::stated_program_folder();
     std::error_code unknown;
     return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
 }

@@ -12,7 +12,10 @@ HERE = Path(__file__).resolve().parent
 
 def shipped_dbc():
     """The DBC file that comes with narpa: one body "chaser" at 0x100, camera 0, and the messages of a closed loop."""
-    return HERE.parents[1] / "protocols/can/narpa.dbc"  # in the repository and in PREFIX/share/narpa
+    name = "protocols/can/narpa.dbc"
+    below = [HERE.parents[1] / name]  # in the repository and in PREFIX/share/narpa
+    below += [folder / "share/narpa" / name for folder in HERE.parents]  # PREFIX/lib/python3.*/dist-packages/narpa
+    return next((path for path in below if path.is_file()), below[0])
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,11 @@ def rotate(q, vector):
     return product(product(q, np.append(0, vector)), conjugate(q))[1:]
 
 
+def to_matrix(q):
+    """The (3, 3) matrix whose product with a vector is rotate(q, vector)."""
+    return np.array([rotate(q, axis) for axis in np.eye(3)]).T
+
+
 def from_vector(rotation_vector):
     """The rotation by the angle |v| (rad) about the axis v."""
     v = np.asarray(rotation_vector, float)

@@ -8,3 +8,13 @@ def modules(*names):
     if missing:
         print(f"SKIP: not installed: {', '.join(missing)} (scripts/setup test)")
         sys.exit(77)
+
+
+def compiled():
+    """Skips unless narpa's compiled module was built."""
+    modules("numpy")
+    try:
+        import narpa.compiled  # noqa: F401
+    except ImportError as error:
+        print(f"SKIP: {error}")
+        sys.exit(77)

@@ -13,5 +13,6 @@ Command add_bench_lidar(Parser bench);
 Command add_bench_atmosphere(Parser bench);
 Command add_bench_estimate(Parser bench);
 Command add_bench_terrain(Parser bench);
+Command add_bench_frames(Parser bench);
 
 }  // namespace narpa::cli

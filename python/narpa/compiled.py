@@ -1,6 +1,8 @@
 """The compiled module, or why it is not there."""
+from importlib import import_module
+
 try:
-    from . import _narpa
+    _narpa = import_module("._narpa", __package__)
 except ModuleNotFoundError as error:
     if error.name != f"{__package__}._narpa":
         raise

@@ -33,6 +33,10 @@ for name in [
 ]:  # fmt: skip
     if not (prefix / name).is_file():
         wrong.append(f"{name} is missing")
+# The Python package with its compiled module, where pybind11 is installed.
+packages = [path.parent for path in prefix.glob("lib/python3*/dist-packages/narpa") if list(path.glob("_narpa.*.so"))]
+COMPILED = "import narpa; from narpa import dbc; dbc.read(); assert narpa.load_scene('cornell').render().dn.max() > 0"
+
 if (prefix / "lib/libnarpa_bench.a").exists():
     wrong.append("lib/libnarpa_bench.a is installed, though nothing uses it")
 
@@ -47,6 +51,7 @@ for command in [
     [prefix / "bin/narpa-plot", "--help"],
     [sys.executable, "-c", "from narpa import dbc; dbc.read()"],
     [sys.executable, "-c", IMPORT_EXAMPLE, share / "examples"],
+    *(["/usr/bin/env", f"PYTHONPATH={package}", sys.executable, "-c", COMPILED] for package in packages),
 ]:
     ran = subprocess.run(command, env=environment, cwd=prefix, capture_output=True, text=True)
     if ran.returncode:

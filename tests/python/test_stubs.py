@@ -1,5 +1,8 @@
 """narpa/__init__.pyi names what the compiled module has, and every public name has a docstring."""
 import ast
+import os
+import subprocess
+import sys
 import unittest
 from pathlib import Path
 
@@ -43,6 +46,15 @@ class Stubs(unittest.TestCase):
         for kind in (narpa.Scene, narpa.Emulator):
             for name in public_of(kind) - {"load", "parse", "name", "file", "report"}:
                 self.assertTrue(getattr(kind, name).__doc__, f"{kind.__name__}.{name}")
+
+
+class WithoutTheModule(unittest.TestCase):
+    def test_the_pure_part_works_and_the_rest_says_what_is_missing(self):
+        package = Path(narpa.__file__).resolve().parents[1]  # the sources
+        program = "import narpa, narpa.rotation\ntry:\n    narpa.load_scene\nexcept ImportError as error:\n    print(error)"
+        done = subprocess.run([sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": str(package)}, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, "PYTHONPATH to build/release/python .*pybind11-dev")
 
 
 if __name__ == "__main__":

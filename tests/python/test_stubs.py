@@ -52,7 +52,8 @@ class WithoutTheModule(unittest.TestCase):
     def test_the_pure_part_works_and_the_rest_says_what_is_missing(self):
         package = Path(narpa.__file__).resolve().parents[1]  # the sources
         program = "import narpa, narpa.rotation\ntry:\n    narpa.load_scene\nexcept ImportError as error:\n    print(error)"
-        done = subprocess.run([sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": str(package)}, capture_output=True, text=True)
+        environment = {**os.environ, "PYTHONPATH": str(package)}
+        done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, "PYTHONPATH to build/release/python .*pybind11-dev")
 

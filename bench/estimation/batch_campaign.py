@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Gives `narpa estimate --batch` a wrong model of flown rehearsals, and counts what it finds.
 
-Usage: batch_campaign.py FOLDER OUT.json [--every N] [--jobs N]
+Usage: batch_campaign.py FOLDER OUT.json [--every N] [--jobs N] [--runs N]
 FOLDER: of `narpa rehearse SCENARIO --runs N`. For each run, three batches: with one error alone, a kind in turn; with all
 errors; and with all errors over the known path. Errors are drawn from the priors, by the run's number.
 """
@@ -93,8 +93,10 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--every", type=int, default=10)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--runs", type=int, help="of the folder (default: all)")
     o = parser.parse_args()
     runs = sorted(p for p in (o.folder / "runs").iterdir() if (p / "emulator" / "run.json").exists())
+    runs = runs[: o.runs]
     if not runs:
         parser.error(f"{o.folder}: no runs, expected a folder of `narpa rehearse SCENARIO --runs N`")
     tasks = {"one error": [], "all errors": [], "all errors, path known": []}
@@ -103,11 +105,12 @@ def main():
         tasks["one error"].append((run, draw([kinds[number % len(kinds)]], number), False))
         tasks["all errors"].append((run, draw(kinds, 1000 + number), False))
         tasks["all errors, path known"].append((run, draw(kinds, 1000 + number), True))
-    results = {}
+    results = {name: [] for name in tasks}
     with concurrent.futures.ThreadPoolExecutor(o.jobs) as pool:
         for name, group in tasks.items():
-            results[name] = list(pool.map(lambda t: batch(*t, o.every), group))
-            o.out.write_text(json.dumps(results, indent=1))
+            for result in pool.map(lambda t: batch(*t, o.every), group):
+                results[name].append(result)
+                o.out.write_text(json.dumps(results, indent=1))
             table(name, results[name])
 
 

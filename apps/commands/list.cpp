@@ -1,4 +1,4 @@
-// narpa list - the scenarios and scenes that come with narpa.
+// narpa list - the scenarios, scenes and recipes of data sets that come with narpa.
 #include <fmt/format.h>
 
 #include "apps/cli.h"
@@ -9,10 +9,11 @@ namespace {
 
 Outcome list() {
     nlohmann::json document;
-    for (const FileKind kind : {FileKind::scenario, FileKind::scene}) {
+    for (const FileKind kind : {FileKind::scenario, FileKind::scene, FileKind::dataset}) {
         const std::string word = std::string(kFileKindWords[static_cast<std::size_t>(kind)]);
         say(kind == FileKind::scenario ? "scenarios, for `narpa rehearse NAME`:"
-                                       : "scenes, for `narpa check`, `run`, `render` and `scan`:");
+            : kind == FileKind::scene  ? "scenes, for `narpa check`, `run`, `render` and `scan`:"
+                                       : "recipes of data sets, for `narpa dataset NAME`:");
         nlohmann::json files = nlohmann::json::array();
         for (const ShippedFile& s : shipped_files(kind)) {
             say(fmt::format("  {:<26} {}", s.name, s.about));
@@ -31,7 +32,8 @@ Outcome list() {
 }  // namespace
 
 Command add_list(Parser app) {
-    const Parser c = app.subcommand("list", "Name the scenarios and scenes that come with narpa");
+    const Parser c =
+        app.subcommand("list", "Name the scenarios, scenes and recipes of data sets that come with narpa");
     c.group("Start here");
     return [] { return list(); };
 }

@@ -67,6 +67,7 @@ std::optional<FileKind> kind_of(const std::string& file) {
     std::optional<FileKind> kind;
     for (int i = 0; i < kLines && std::getline(in, line); ++i) {
         if (line.starts_with("[scenario]")) return FileKind::scenario;
+        if (line.starts_with("[dataset]")) return FileKind::dataset;
         for (const char* table : {"[scene]", "[[body]]", "[[camera]]", "[[lidar]]"})
             if (line.starts_with(table)) kind = FileKind::scene;
     }
@@ -75,17 +76,33 @@ std::optional<FileKind> kind_of(const std::string& file) {
 
 namespace {
 
-/// `given`, file or name, is of the other kind than `expected`.
-Error other_kind(FileKind expected, const std::string& given) {
-    return {
-        fmt::format(fmt::runtime(expected == FileKind::scene
-                                     ? "is a scenario, expected a scene: `narpa rehearse {0}` flies it, and "
-                                       "`narpa check {0}` names its scene"
-                                     : "is a scene, expected a scenario, which names a scene and how it is flown "
-                                       "(docs/rehearsal.md; `narpa list` has some): `narpa render {0}` and "
-                                       "`narpa run {0}` take scenes"),
-                    given),
-        given};
+/// What a file of each kind is, and what a command that expects it says of others.
+struct FileKindTexts {
+    std::string_view is;       ///< "is a scene"
+    std::string_view expects;  ///< of a command that takes this kind
+};
+constexpr std::array<FileKindTexts, kFileKindWords.size()> kFileKindTexts{{
+    {"is a scene", "expected a scene"},
+    {"is a scenario",
+     "expected a scenario, which names a scene and how it is flown (docs/rehearsal.md; `narpa list` "
+     "has some)"},
+    {"is the recipe of a data set", "expected a recipe of a data set (docs/datasets.md)"},
+}};
+
+/// What takes a file of this kind; `{0}` is its name.
+constexpr std::array<const char*, kFileKindWords.size()> kTakenBy{
+    "`narpa render {0}` and `narpa run {0}` take scenes",
+    "`narpa rehearse {0}` flies it, and `narpa check {0}` names its scene",
+    "`narpa dataset {0}` makes its images",
+};
+
+/// `given`, file or name, is of the kind `found`, not `expected`.
+Error other_kind(FileKind expected, FileKind found, const std::string& given) {
+    const auto row = static_cast<std::size_t>(found);
+    return {fmt::format("{}, {}: {}", kFileKindTexts[row].is,
+                        kFileKindTexts[static_cast<std::size_t>(expected)].expects,
+                        fmt::format(fmt::runtime(kTakenBy[row]), given)),
+            given};
 }
 
 }  // namespace
@@ -94,7 +111,7 @@ Result<std::string> find_file(FileKind kind, const std::string& file_or_name) {
     std::error_code error;
     if (fs::exists(file_or_name, error) && !fs::is_directory(file_or_name, error)) {
         const auto found = fs::is_regular_file(file_or_name, error) ? kind_of(file_or_name) : std::nullopt;
-        if (found && *found != kind) return other_kind(kind, file_or_name);
+        if (found && *found != kind) return other_kind(kind, *found, file_or_name);
         return file_or_name;
     }
     return find_shipped(kind, file_or_name);
@@ -117,8 +134,10 @@ Result<std::string> find_shipped(FileKind kind, const std::string& name) {
         names.push_back(s.name);
     }
     if (with_this_stem.size() == 1) return with_this_stem.front();
-    for (const ShippedFile& s : shipped_files(kind == FileKind::scene ? FileKind::scenario : FileKind::scene))
-        if (s.name == name) return other_kind(kind, name);
+    for (std::size_t other = 0; other < kFileKindWords.size(); ++other)
+        if (static_cast<FileKind>(other) != kind)
+            for (const ShippedFile& s : shipped_files(static_cast<FileKind>(other)))
+                if (s.name == name) return other_kind(kind, static_cast<FileKind>(other), name);
     return Error{fmt::format("no such file, expected a {0} file (TOML) or the name of a {0} that `narpa list` "
                              "shows{1}",
                              kFileKindWords[static_cast<std::size_t>(kind)],

@@ -1,4 +1,5 @@
-/// renderer/keys/shipped_file.h - scene and scenario files: by path, or by the name of one that comes with narpa.
+/// renderer/keys/shipped_file.h - scenes, scenarios and recipes of data sets: by path, or by the name of one that
+/// comes with narpa.
 #pragma once
 
 #include <array>
@@ -13,8 +14,9 @@
 
 namespace narpa {
 
-enum class FileKind : std::uint8_t { scene, scenario };
-inline constexpr std::array<std::string_view, 2> kFileKindWords{"scene", "scenario"};
+enum class FileKind : std::uint8_t { scene, scenario, dataset };
+/// Also the table at the top of a file of this kind that may have `based_on`.
+inline constexpr std::array<std::string_view, 3> kFileKindWords{"scene", "scenario", "dataset"};
 
 /// The folder of the scenes beside the program, in a build and when installed; empty: there is none.
 [[nodiscard]] std::filesystem::path shipped_folder();
@@ -27,9 +29,9 @@ struct ShippedFile {
 /// All of one kind that lie beside the program, in a build and when installed, by name.
 [[nodiscard]] std::vector<ShippedFile> shipped_files(FileKind kind);
 
-/// The kind of a TOML file, scene or scenario, by its tables; empty where it is neither.
+/// The kind of a TOML file by its tables; empty where it is of no kind.
 [[nodiscard]] std::optional<FileKind> kind_of(const std::string& file);
-/// The path of a file, or of the shipped file with this name. Errors: no such file or name; a file of the other
+/// The path of a file, or of the shipped file with this name. Errors: no such file or name; a file of another
 /// kind.
 [[nodiscard]] Result<std::string> find_file(FileKind kind, const std::string& file_or_name);
 /// The file itself or, where there is none, the one under shipped_folder(): "docking/approach.csv".

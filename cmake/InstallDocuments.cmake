@@ -1,6 +1,6 @@
 # Takes links to files that are not installed off the installed documents; their texts stay. Usage:
 # cmake -DSHARE=FOLDER -P InstallDocuments.cmake
-set(not_installed "apps|base|bench|drivers|emulator|estimator|plot|rehearsal|renderer|tests|tracking")
+set(not_installed "apps|base|bench|dataset|drivers|emulator|estimator|plot|rehearsal|renderer|tests|tracking")
 file(GLOB_RECURSE documents ${SHARE}/*.md)
 foreach(document ${documents})
   file(READ ${document} text)

@@ -176,9 +176,26 @@ def surface_map(interval=1.0):
             "lines": [{"level_m": 10.0, "closed": True, "px": circle, "position_m": [[0, 0, 0]] * 40}] if interval == 1 else []}  # fmt: skip
 
 
+def dataset(images=40):
+    def histogram(label, values, logarithmic=False):
+        counts, edges = np.histogram(values, 12) if len(values) else ([], [])
+        return {"label": label, "logarithmic": logarithmic, "edges": list(map(float, edges)), "counts": list(map(int, counts))}
+
+    return {"images": images, "empty_images": 1, "empty_share": 1 / max(1, images),
+            "histograms": {"range_m": histogram("range, m", random.uniform(2, 50, images), True), "phase_deg": histogram("phase angle, deg", []),
+                           "brightness": histogram("brightness", np.full(images, 0.1))}}  # fmt: skip
+
+
+def contact_sheet(tiles=8):
+    one = lambda k: {"image": k, "pixels": image(64, 48), "step": 2, "range_m": 12.5, "phase_deg": None if k % 2 else 30.0,
+                     "keypoints": [[[10.0, 20.0], "visible"], [[40.0, 50.0], "occluded"]], "boxes": [[8, 10, 60, 50]] if k else []}  # fmt: skip
+    return {"tiles": [one(k) for k in range(tiles)]}
+
+
 DOCUMENTS = {"convergence": convergence, "ladder": ladder, "loop": loop, "estimates": estimates, "batch": batch, "calibration": calibration, "approach": approach,
              "approach_frames": approach_frames, "stereo": stereo, "icp": icp, "filter": filter_, "estimators": estimators,
-             "replay": replay, "rehearsal": rehearsal, "campaign": campaign, "map": surface_map, "comparison": comparison}  # fmt: skip
+             "replay": replay, "rehearsal": rehearsal, "campaign": campaign, "map": surface_map, "comparison": comparison,
+             "dataset": dataset, "contact_sheet": contact_sheet}  # fmt: skip
 
 
 class Plots(unittest.TestCase):
@@ -206,7 +223,7 @@ class Plots(unittest.TestCase):
                         self.assertIn("</svg>", file.read_text())
 
     def test_documents_of_nothing_become_pictures_too(self):
-        nothing = {"ladder": {"scenes": []}, "loop": {"runs": []}, "estimates": {"frames": []}, "campaign": campaign(0), "map": surface_map(100.0),
+        nothing = {"ladder": {"scenes": []}, "loop": {"runs": []}, "estimates": {"frames": []}, "campaign": campaign(0), "map": surface_map(100.0), "dataset": dataset(0), "contact_sheet": contact_sheet(0),
                    "rehearsal": rehearsal(lockstep=True, flown=False), "comparison": {**comparison(48), "residual_range_dn": 0.0}}  # fmt: skip
         for kind, document in nothing.items():
             with self.subTest(kind):

@@ -9,6 +9,7 @@ a matplotlib figure, or a dictionary of figures by name. The functions are in th
     replay       replay: `narpa replay --reference`
     rehearsal    rehearsal, campaign: the charts of a rehearsal's page
     surface      map: `narpa map`
+    dataset      dataset, contact_sheet: `narpa dataset`
 """
 import argparse
 import json
@@ -21,9 +22,9 @@ MATPLOTLIB_MISSING = 3  # exit status, as narpa's: a dependency is missing
 
 
 def drawers():
-    from narpa.plots import bench, estimation, rehearsal, replay, surface
+    from narpa.plots import bench, dataset, estimation, rehearsal, replay, surface
 
-    return {name: function for module in (bench, estimation, replay, rehearsal, surface) for name, function in module.KINDS.items()}
+    return {name: function for module in (bench, estimation, replay, rehearsal, surface, dataset) for name, function in module.KINDS.items()}
 
 
 def draw(document, output, picture_format=None):

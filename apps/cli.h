@@ -35,6 +35,7 @@ Command add_replay(Parser app);
 Command add_compare(Parser app);
 Command add_estimate(Parser app);
 Command add_calibrate(Parser app);
+Command add_dataset(Parser app);
 Command add_rehearse(Parser app);
 Command add_judge(Parser app);
 

@@ -22,6 +22,7 @@
 #include "apps/warnings.h"
 #include "base/constants.h"
 #include "base/write_file.h"
+#include "dataset/recipe/recipe.h"
 #include "drivers/can/can_bus.h"
 #include "drivers/can/usb_adapters.h"
 #include "drivers/lidar/packet_sink.h"
@@ -496,8 +497,10 @@ struct SchemaRow {
     std::string name;
     const TableKeys& keys;
 };
-const std::array<SchemaRow, 3> kSchemas{
-    {{"scene", kSceneFileKeys}, {"lidar", kLidarDescriptionKeys}, {"scenario", rehearsal::kScenarioFileKeys}}};
+const std::array<SchemaRow, 4> kSchemas{{{"scene", kSceneFileKeys},
+                                         {"lidar", kLidarDescriptionKeys},
+                                         {"scenario", rehearsal::kScenarioFileKeys},
+                                         {"dataset", dataset::kRecipeFileKeys}}};
 
 Outcome print_schema(const std::string& name) {
     const auto row = std::ranges::find(kSchemas, name, &SchemaRow::name);
@@ -505,19 +508,34 @@ Outcome print_schema(const std::string& name) {
     return nlohmann::json();  // the schema is the one document
 }
 
+/// Where the argument names a scenario or a recipe of a data set: prints it, adds its part to the document, and
+/// goes on with its scene.
+Status find_scene(SceneArgument& argument, nlohmann::json& document) {
+    const auto named = find_file(FileKind::scene, argument.file);
+    if (named) return Ok{};
+    if (const auto file = find_file(FileKind::scenario, argument.file)) {
+        const auto scenario = rehearsal::read_scenario(*file, argument.sets);
+        if (!scenario) return scenario.error();
+        document["scenario"] = describe(*scenario);
+        argument = {scenario->scene, scenario->scene_overrides};
+    } else if (const auto recipe_file = find_file(FileKind::dataset, argument.file)) {
+        const auto recipe = dataset::read_recipe(*recipe_file, argument.sets);
+        if (!recipe) return recipe.error();
+        say(fmt::format("recipe \"{}\" of a data set; its scene: {}", recipe->name, recipe->scene));
+        document["dataset"] = {{"file", recipe->file}, {"name", recipe->name}, {"scene", recipe->scene}};
+        argument = {recipe->scene, recipe->sets};
+    } else {
+        return named.error();
+    }
+    return Ok{};
+}
+
 Outcome check(const CheckOptions& o) {
     if (!o.schema.empty()) return print_schema(o.schema);
     if (o.scene.file.empty()) return Error{"SCENE is required"};
     nlohmann::json document;
     SceneArgument scene_argument = o.scene;
-    if (const auto named = find_file(FileKind::scene, o.scene.file); !named) {
-        const auto scenario_file = find_file(FileKind::scenario, o.scene.file);
-        if (!scenario_file) return named.error();
-        const auto scenario = rehearsal::read_scenario(*scenario_file, o.scene.sets);
-        if (!scenario) return scenario.error();
-        document["scenario"] = describe(*scenario);
-        scene_argument = {scenario->scene, scenario->scene_overrides};
-    }
+    if (auto named = find_scene(scene_argument, document); !named) return named.error();
     auto scene = scene_argument.load_anyway();
     if (!scene) return scene.error();
     auto world = World::create(*std::move(scene));
@@ -569,8 +587,9 @@ Outcome check(const CheckOptions& o) {
 
 Command add_check(Parser app) {
     auto o = std::make_shared<CheckOptions>();
-    const Parser c = app.subcommand("check", "Check a scene or scenario and this machine; names what is missing");
-    c.option("SCENE", o->scene.file, "Scene or scenario file (TOML), or a name that `narpa list` shows");
+    const Parser c = app.subcommand(
+        "check", "Check a scene, scenario or recipe of a data set, and this machine; names what is missing");
+    c.option("SCENE", o->scene.file, "Scene, scenario or recipe file (TOML), or a name that `narpa list` shows");
     o->scene.add_settings_to(c);
     c.option("DEVICE", o->devices,
              "Devices that the run will need, which are opened as a test: vcan0, slcan:PORT, usb:, /dev/video10, "

@@ -23,6 +23,7 @@ SUBCOMMANDS = {
     "map": ["--camera", "--of", "--body", "--interval", "--datum", "--up", "--time", "--pose", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
     "estimate": ["--frame", "--sweep", "--no-truth", "--uncertainty", "--frame-noise", "--method", "--start"],
+    "dataset": ["RECIPE", "-n, --images", "-o", "--shard", "--gather", "--verify", "--threads", "--set", "--strict"],
     "calibrate": ["IMAGE", "--trajectory", "--method", "--unknowns", "-o"],
     "compare": ["--frame", "--camera", "--target", "--pose", "-o"],
 }
@@ -85,9 +86,11 @@ def check_exit_codes():
 def check_names():
     """Scenes and scenarios are found by name; a file of the other kind is refused."""
     document = json.loads(narpa("list", "--json").stdout)
-    names = {kind: {entry["name"] for entry in document[kind]} for kind in ("scenarios", "scenes")}
+    names = {kind: {entry["name"] for entry in document[kind]} for kind in ("scenarios", "scenes", "datasets")}
     expect({"docking", "rbar", "dispersions"} <= names["scenarios"], f"list names scenarios: {sorted(names['scenarios'])}")
     expect({"docking", "cornell"} <= names["scenes"], f"list names scenes: {sorted(names['scenes'])}")
+    expect(names["datasets"] == {"docking/docking-dataset"}, f"list names recipes of data sets: {names['datasets']}")
+    expect_refusal(2, r"^narpa: docking/docking-dataset: is the recipe of a data set, expected a scene: `narpa dataset docking/docking-dataset` makes", "render", "docking/docking-dataset", "-o", folder / "a.png")
     by_name = json.loads(narpa("check", "docking", "--json").stdout)["scene"]
     by_file = json.loads(narpa("check", BUILD / "scenes/docking/docking.toml", "--json").stdout)["scene"]
     expect(by_name == by_file, "check docking is check of docking.toml")

@@ -356,3 +356,56 @@ BROKEN_SCENARIOS = [
     ("navigation = {sigmas = 4.0, share = 0.99}", "navigation = {share = 1.5}"), ("contact = {}", "contact = 1"),
     ("complete = true", "complete = 1"), ("[target]", "[targets]"), ("[control]", "[controls]"), ("[start]", "[[start]]"),
 ]
+
+# A recipe of a data set of ITS_SCENE.
+GOOD_RECIPE = """
+[dataset]
+name = "r"
+scene = "scene.toml"
+set = ["render.spp=1"]
+camera = "nav"
+target = "station"
+seed = 1
+outputs = ["mask"]
+[pose]
+range_m = {kind = "log_uniform", between = [2.0, 8.0]}
+margin = 0.1
+point_m = [0.0, 0.0, 1.0]
+[pose.attitude]
+kind = "cone"
+axis = [1.0, 0.0, 0.0]
+half_angle_deg = 30.0
+roll_deg = {between = [-5.0, 5.0]}
+[illumination]
+phase_deg = {kind = "choice", values = [10.0, 20.0]}
+[exposure]
+time_factor = {between = [0.5, 2.0]}
+[surface]
+albedo_factor = {between = [0.5, 1.5]}
+[[variant]]
+name = "v"
+weight = 2.0
+[[background]]
+kind = "none"
+weight = 1.0
+[keypoints]
+count = 8
+"""
+
+BROKEN_RECIPES = [
+    ('name = "r"', "name = 7"), ('name = "r"', ""), ('scene = "scene.toml"', ""), ('scene = "scene.toml"', "scene = 1"),
+    ('set = ["render.spp=1"]', 'set = "render.spp=1"'), ('camera = "nav"', 'cameras = "nav"'), ('target = "station"', "target = 1"),
+    ("seed = 1", "seed = -1"), ("seed = 1", "seed = 1.5"), ('outputs = ["mask"]', 'outputs = "mask"'),
+    ('range_m = {kind = "log_uniform", between = [2.0, 8.0]}', "range_m = 2.0"),
+    ('range_m = {kind = "log_uniform", between = [2.0, 8.0]}', 'range_m = {kind = "log_uniform", between = [0.0, 8.0]}'),
+    ('range_m = {kind = "log_uniform", between = [2.0, 8.0]}', 'range_m = {kind = "normal", between = [2.0, 8.0]}'),
+    ('range_m = {kind = "log_uniform", between = [2.0, 8.0]}', 'range_m = {kind = "uniform", values = [2.0, 8.0]}'),
+    ('range_m = {kind = "log_uniform", between = [2.0, 8.0]}', 'range_m = {between = [2.0]}'),
+    ("margin = 0.1", "margin = 0.6"), ("margin = 0.1", "margins = 0.1"), ("point_m = [0.0, 0.0, 1.0]", "point_m = [0.0, 1.0]"),
+    ('kind = "cone"', 'kind = "pyramid"'), ('kind = "cone"', 'kind = "uniform"'), ("axis = [1.0, 0.0, 0.0]", ""),
+    ("half_angle_deg = 30.0", "half_angle_deg = 181.0"), ("half_angle_deg = 30.0", ""),
+    ("roll_deg = {between = [-5.0, 5.0]}", "roll_deg = 5.0"), ('phase_deg = {kind = "choice", values = [10.0, 20.0]}', 'phase_deg = {kind = "choice"}'),
+    ("time_factor = {between = [0.5, 2.0]}", 'time_factor = "long"'), ("albedo_factor = {between = [0.5, 1.5]}", "albedo = {between = [0.5, 1.5]}"),
+    ('name = "v"', ""), ("weight = 2.0", "weight = 0"), ('kind = "none"', 'kind = "earth"'), ('kind = "none"', 'kind = "body"'),
+    ('kind = "none"', ""), ("weight = 1.0", "weight = -1.0"), ("count = 8", "count = 0"), ("count = 8", "number = 8"),
+]  # fmt: skip

@@ -19,7 +19,7 @@ except ImportError as missing:
     print(f"SKIP: {missing} (scripts/setup test)")
     sys.exit(77)
 
-from broken_files import BROKEN, BROKEN_SCENARIOS, BROKEN_SKY, GOOD, GOOD_SCENARIO, ITS_SCENE, SKY
+from broken_files import BROKEN, BROKEN_RECIPES, BROKEN_SCENARIOS, BROKEN_SKY, GOOD, GOOD_RECIPE, GOOD_SCENARIO, ITS_SCENE, SKY
 
 NARPA, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 GOOD = GOOD.replace("CATALOGUE", str(SOURCE.resolve() / "scenes/stars/brightest.csv"))
@@ -30,7 +30,7 @@ def schema(kind):
     return json.loads(said.stdout)
 
 
-SCHEMAS = {kind: schema(kind) for kind in ("scene", "lidar", "scenario")}
+SCHEMAS = {kind: schema(kind) for kind in ("scene", "lidar", "scenario", "dataset")}
 
 
 def errors(kind, document):
@@ -77,7 +77,7 @@ def merged(path, head):
 def kind_of(document):
     if isinstance(document.get("lidar"), dict):
         return "lidar"
-    return "scenario" if "scenario" in document else "scene"
+    return next((kind for kind in ("scenario", "dataset") if kind in document), "scene")
 
 
 # --- The documents ---
@@ -234,6 +234,12 @@ class Documents(unittest.TestCase):
         self.compare("lidar", "lidar-description.md")
 
 
+    def test_dataset(self):
+        documented = self.compare("dataset", "datasets.md")
+        self.assertEqual({path.split(".")[0] for path in documented}, set(SCHEMAS["dataset"]["properties"]))
+        self.assertLessEqual({"pose.range_m", "pose.attitude"}, set(documented))
+
+
 class RehearsalDocument(unittest.TestCase):
     """docs/rehearsal.md describes scenarios by tables without ranges: keys, required ones, kinds, choices, defaults."""
 
@@ -326,6 +332,9 @@ class Broken(unittest.TestCase):
 
     def test_each_broken_scenario_is_refused_by_both(self):
         self.compare("scenario", GOOD_SCENARIO, BROKEN_SCENARIOS, 50)
+
+    def test_each_broken_recipe_is_refused_by_both(self):
+        self.compare("dataset", GOOD_RECIPE, BROKEN_RECIPES, 25)
 
     def test_each_broken_sky_and_terrain_is_refused_by_both(self):
         self.assertEqual(errors("scene", tomllib.loads(SKY)), [])

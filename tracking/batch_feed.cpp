@@ -40,12 +40,10 @@ BatchTime ChaserPath::at(std::int64_t t_ns) const {
 }
 
 Result<std::unique_ptr<BatchFrameFeed>> BatchFrameFeed::create(const World& model, std::size_t camera,
-                                                               const TrackerOptions& options,
-                                                               bool observes_brightness) {
+                                                               const TrackerOptions& options, bool keeps_frames) {
     auto tracker = FrameTracker::create(model, camera, options);
     if (!tracker) return tracker.error();
-    return std::unique_ptr<BatchFrameFeed>(
-        new BatchFrameFeed(model, camera, *std::move(tracker), observes_brightness));
+    return std::unique_ptr<BatchFrameFeed>(new BatchFrameFeed(model, camera, *std::move(tracker), keeps_frames));
 }
 
 void BatchFrameFeed::pass(const FrameLedger& ledger, const World& truth, const BodyPoses& at) {
@@ -60,28 +58,44 @@ void BatchFrameFeed::take(const FrameLedger& ledger, std::span<const std::uint8_
                           const BodyPoses& at, std::int64_t stamp_late_ns) {
     pass(ledger, truth, at);
     TrackedFrame f = tracker_->take(ledger, bytes, at);
-    if (const PointObservations* points = tracker_->points(); points && f.measured)
-        frames_.push_back(
-            {{.t_ns = f.t_ns + stamp_late_ns},
-             *f.measured,
-             *points,
-             observes_brightness_ ? brightness(ledger, bytes, at, *f.measured) : BrightnessObservations{}});
+    if (const PointObservations* points = tracker_->points(); points && f.measured) {
+        frames_.push_back({{.t_ns = f.t_ns + stamp_late_ns}, *f.measured, *points, {}});
+        if (keeps_frames_) kept_.push_back({ledger, {bytes.begin(), bytes.end()}, at});
+    }
     tracked_.push_back(std::move(f));
 }
 
-BrightnessObservations BatchFrameFeed::brightness(const FrameLedger& ledger, std::span<const std::uint8_t> bytes,
-                                                  const BodyPoses& at, const Rigid3& T_camera_target) const {
-    const RenderScene& scene = model_.render_scene();
-    Camera camera = model_.scene().cameras[camera_];
-    if (!set_to_frame(ledger, model_.scene().cameras[camera_], camera)) return {};
-    const auto image = measured_image(camera, bytes);
+BrightnessObservations BatchFrameFeed::brightness(const World& corrected, const Kept& frame,
+                                                  const Rigid3& T_camera_target,
+                                                  const std::array<double, 2>& light_rad) const {
+    const Camera& in_the_scene = corrected.scene().cameras[camera_];
+    Camera camera = in_the_scene;
+    if (!set_to_frame(frame.ledger, in_the_scene, camera)) return {};
+    const auto image = measured_image(camera, frame.bytes);
     if (!image) return {};
-    const RenderSettings& render = model_.scene().render;
+    const RenderSettings& render = corrected.scene().render;
     FrameSettings settings;
     settings.spp = tracker_->options().spp, settings.seed = ~tracker_->options().seed;
-    settings.frame = ledger.frame;  // errors of samples that frames have in common would not average out
+    settings.frame = frame.ledger.frame;  // errors of samples that frames have in common would not average out
     settings.method = render.method, settings.max_depth = render.max_depth;
-    return observe_brightness(scene, camera, tracker_->target(), at, *image, T_camera_target, settings);
+    return narpa::observe_brightness(corrected.render_scene(), camera, tracker_->target(), frame.at, *image,
+                                     T_camera_target, settings, light_rad);
+}
+
+void BatchFrameFeed::observe_brightness(const World& corrected, const BatchResult& found, BatchInput& input) const {
+    const Camera& c = corrected.scene().cameras[camera_];
+    const Rigid3 T_chaser_camera = c.mount < 0 ? Rigid3{} : c.T_mount_camera;
+    std::array<double, 2> light_rad{};
+    for (const BatchEstimate& e : found.unknowns)
+        if (e.unknown == BatchUnknown::light_x || e.unknown == BatchUnknown::light_y)
+            light_rad[e.unknown == BatchUnknown::light_y] = e.value;
+    for (std::size_t i = 0; i < kept_.size(); ++i) {
+        BatchFrame& frame = input.frames[i];
+        auto state = std::ranges::upper_bound(found.states, frame.time.t_ns, {}, &BatchState::t_ns);
+        if (state != found.states.begin()) --state;
+        frame.brightness =
+            brightness(corrected, kept_[i], inverse(T_chaser_camera) * state->T_chaser_target, light_rad);
+    }
 }
 
 void BatchFrameFeed::finish(BatchInput& input) {

@@ -1,6 +1,7 @@
 /// tracking/batch_feed.h - frames and sweeps of a logged run, tracked one after another, as the input of a batch.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -36,9 +37,9 @@ class BatchFrameFeed {
 public:
     /// `model`: the world as the estimator takes it to be. Outlives it. Errors: those of FrameTracker, a method
     /// that finds no points.
-    /// `observes_brightness`: albedo or the light's direction are estimated.
+    /// `keeps_frames`: for observe_brightness().
     static Result<std::unique_ptr<BatchFrameFeed>> create(const World& model, std::size_t camera,
-                                                          const TrackerOptions& options, bool observes_brightness);
+                                                          const TrackerOptions& options, bool keeps_frames);
     /// `truth`: the world of the run; `at`: its bodies; `stamp_late_ns`: error of the time stamp.
     void take(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const World& truth,
               const BodyPoses& at, std::int64_t stamp_late_ns);
@@ -47,20 +48,31 @@ public:
     [[nodiscard]] const std::vector<TrackedFrame>& tracked() const noexcept { return tracked_; }
     [[nodiscard]] std::size_t target() const noexcept { return tracker_->target(); }
     void finish(BatchInput& input);
+    /// After finish(): compares the brightness of the frames with `corrected`, the model without the errors that
+    /// `found`, a solution without their brightness or with one of an earlier light, has found, at its poses. With
+    /// the model as it is, frame and render would be pixels apart.
+    void observe_brightness(const World& corrected, const BatchResult& found, BatchInput& input) const;
 
 private:
-    BatchFrameFeed(const World& model, std::size_t camera, std::unique_ptr<FrameTracker> tracker,
-                   bool observes_brightness)
-        : model_(model), camera_(camera), observes_brightness_(observes_brightness), tracker_(std::move(tracker)) {}
-    [[nodiscard]] BrightnessObservations brightness(const FrameLedger& ledger, std::span<const std::uint8_t> bytes,
-                                                    const BodyPoses& at, const Rigid3& T_camera_target) const;
+    /// A frame that entered the batch.
+    struct Kept {
+        FrameLedger ledger;
+        std::vector<std::uint8_t> bytes;
+        BodyPoses at;
+    };
+    BatchFrameFeed(const World& model, std::size_t camera, std::unique_ptr<FrameTracker> tracker, bool keeps_frames)
+        : model_(model), camera_(camera), keeps_frames_(keeps_frames), tracker_(std::move(tracker)) {}
+    [[nodiscard]] BrightnessObservations brightness(const World& corrected, const Kept& frame,
+                                                    const Rigid3& T_camera_target,
+                                                    const std::array<double, 2>& light_rad) const;
 
     const World& model_;
     std::size_t camera_;
-    bool observes_brightness_;
+    bool keeps_frames_;
     std::unique_ptr<FrameTracker> tracker_;
     std::vector<TrackedFrame> tracked_;
     std::vector<BatchFrame> frames_;
+    std::vector<Kept> kept_;
     ChaserPath path_;
 };
 

@@ -28,9 +28,8 @@ struct BatchPlan {
 
     /// Albedo or the light's direction are unknown.
     [[nodiscard]] bool observes_brightness() const {
-        const BatchValues& sigma = options.prior_sigma;
-        return at(sigma, BatchUnknown::albedo) > 0 || at(sigma, BatchUnknown::light_x) > 0 ||
-               at(sigma, BatchUnknown::light_y) > 0;
+        return std::ranges::any_of(kBrightnessUnknowns,
+                                   [&](BatchUnknown u) { return at(options.prior_sigma, u) > 0; });
     }
     [[nodiscard]] std::int64_t stamp_late_ns() const { return std::llround(1e9 * at(error, BatchUnknown::clock)); }
 };
@@ -178,6 +177,26 @@ Status track_sweeps(const BatchPlan& plan, SweepSource& source) {
     });
 }
 
+/// Solves for what the frames' points tell, then compares brightness with the model corrected by it: twice, as
+/// brightness is not linear in the light's direction.
+Status observe_brightness(const BatchPlan& plan, const FrameSource& source, BatchInput& input) {
+    BatchOptions options = plan.options;
+    for (const BatchUnknown u : kBrightnessUnknowns) at(options.prior_sigma, u) = 0;
+    for (int k = 0; k < 2; ++k, options = plan.options) {
+        const auto found = solve_batch(input, options);
+        if (!found) return found.error();
+        BatchValues geometry{};
+        for (const BatchEstimate& e : found->unknowns) at(geometry, e.unknown) = e.value;
+        for (const BatchUnknown u : kBrightnessUnknowns) at(geometry, u) = 0;
+        Scene scene = (source.model ? *source.model : source.run->world()).scene();
+        if (auto good = apply_model_errors(geometry, source.feed->target(), scene); !good) return good.error();
+        const auto corrected = World::create(std::move(scene));
+        if (!corrected) return corrected.error();
+        source.feed->observe_brightness(**corrected, *found, input);
+    }
+    return Ok{};
+}
+
 BatchTruth truth_of(const BatchInput& input, const BatchValues& error) {
     BatchTruth truth;
     truth.unknowns = expected_of(error);
@@ -220,6 +239,9 @@ Outcome estimate_batch(const RunEstimate& run, const BatchSensors& sensors, cons
     BatchInput input;
     if (frames.feed) frames.feed->finish(input);
     if (sweeps.feed) sweeps.feed->finish(input);
+    if (frames.feed && plan->observes_brightness())
+        if (auto observed = observe_brightness(*plan, frames, input); !observed)
+            return Error{observed.error().what, run.folder, 0, 0, observed.error().kind};
     BatchTruth truth = truth_of(input, plan->error);
     if (frames.feed) truth.alone.push_back(summarise(frames.feed->tracked()));
     if (sweeps.feed) truth.alone.push_back(summarise(sweeps.feed->tracked()));

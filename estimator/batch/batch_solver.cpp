@@ -42,8 +42,7 @@ BatchValues priors_in_use(const BatchInput& input, const BatchOptions& options) 
     BatchValues sigmas = options.prior_sigma;
     const auto has_brightness = [](const BatchFrame& f) { return !f.brightness.blocks.empty(); };
     if (std::ranges::none_of(input.frames, has_brightness))
-        for (const BatchUnknown u : {BatchUnknown::albedo, BatchUnknown::light_x, BatchUnknown::light_y})
-            at(sigmas, u) = 0;
+        for (const BatchUnknown u : kBrightnessUnknowns) at(sigmas, u) = 0;
     for (std::size_t i = 0; i < kBatchUnknowns; ++i)
         if (!is_of_sensors(batch_unknowns()[i], !input.frames.empty(), !input.sweeps.empty())) sigmas[i] = 0;
     return sigmas;

@@ -89,7 +89,8 @@ void set_parts(std::span<const std::array<int, 2>> corners, std::vector<Brightne
 
 BrightnessObservations observe_brightness(const RenderScene& scene, const Camera& camera, std::size_t target,
                                           const BodyPoses& at, const MeasuredImage& image,
-                                          const Rigid3& T_camera_target, const FrameSettings& settings) {
+                                          const Rigid3& T_camera_target, const FrameSettings& settings,
+                                          const std::array<double, 2>& light_rad) {
     ModelView view(scene, camera, target, at);
     const auto shown = [&](const Vec3& turn_rad, bool aovs) {
         view.begin_frame(in_turned_light(at, target, turn_rad), {}, {});
@@ -97,14 +98,18 @@ BrightnessObservations observe_brightness(const RenderScene& scene, const Camera
         return Shown{camera.width, expected_signal(camera, view.radiance())};
     };
     std::vector<Shown> turned;
-    if (const auto& sun = scene.scene().sun)
-        for (const Vec3& axis : light_axes(normalized(sun->direction)))
-            turned.push_back(shown(kTurn_rad * axis, false));
-    const Shown model = shown({}, true);
+    Vec3 turn{};
+    if (const auto& sun = scene.scene().sun) {
+        const auto axes = light_axes(normalized(sun->direction));
+        turn = light_rad[0] * axes[0] + light_rad[1] * axes[1];
+        for (const Vec3& axis : axes) turned.push_back(shown(turn + kTurn_rad * axis, false));
+    }
+    const Shown model = shown(turn, true);
 
     const SensorModel sensor = sensor_model(camera);
     const float brightest = model.dn.empty() ? 0 : *std::ranges::max_element(model.dn);
     BrightnessObservations out;
+    out.light_rad = light_rad;
     std::vector<std::array<int, 2>> corners;
     for (int y = 0; y + kSide <= image.height; y += kSide)
         for (int x = 0; x + kSide <= image.width; x += kSide) {

@@ -9,21 +9,20 @@ namespace {
 
 class BrightnessMeasurement final : public Measurement {
 public:
-    explicit BrightnessMeasurement(const BrightnessObservations& brightness) : blocks_(brightness.blocks) {
+    explicit BrightnessMeasurement(const BrightnessObservations& brightness)
+        : blocks_(brightness.blocks), light_rad_(brightness.light_rad) {
         for (const BrightnessBlock& b : blocks_) mean_ += b.model / static_cast<double>(blocks_.size());
     }
 
     int dimension() const noexcept override { return 1; }
-    std::span<const BatchUnknown> unknowns() const noexcept override {
-        static constexpr std::array kUnknowns{BatchUnknown::albedo, BatchUnknown::light_x, BatchUnknown::light_y};
-        return kUnknowns;
-    }
+    std::span<const BatchUnknown> unknowns() const noexcept override { return kBrightnessUnknowns; }
     bool has_pose() const noexcept override { return false; }
     void associate(const Rigid3&, const BatchValues&) override {}
 
     /// As brightness by the cosine of the angle of incidence changes if light is turned by an angle.
     bool evaluate(const Rigid3&, const BatchValues& values, Residuals& out) const override {
-        const double x = at(values, BatchUnknown::light_x), y = at(values, BatchUnknown::light_y);
+        const double x = at(values, BatchUnknown::light_x) - light_rad_[0],
+                     y = at(values, BatchUnknown::light_y) - light_rad_[1];
         const double angle = std::hypot(x, y), along = std::cos(angle);
         const double across = angle > 0 ? std::sin(angle) / angle : 1;
         const double gain = (1 + at(values, BatchUnknown::albedo)) / mean_;
@@ -55,6 +54,7 @@ public:
 
 private:
     const std::vector<BrightnessBlock>& blocks_;
+    std::array<double, 2> light_rad_;
     double mean_ = 0;  ///< DN
 };
 

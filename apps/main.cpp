@@ -50,6 +50,6 @@ int main(int argc, char** argv) {
          {"narpa rehearse docking                        a docking in a closed loop, with a report",
           "narpa render docking -o out/view.png          what the camera sees",
           "narpa run docking --can vcan0 --video nav=/dev/video10 --log out/run"}},
-        {add_list, add_check, add_rehearse, add_judge, add_run, add_fly, add_render, add_map, add_scan,
-         add_estimate, add_calibrate, add_dataset, add_compare, add_replay, add_bench});
+        {add_list, add_check, add_rehearse, add_run, add_fly, add_render, add_map, add_scan, add_dataset, add_judge,
+         add_estimate, add_calibrate, add_compare, add_replay, add_bench});
 }

@@ -58,7 +58,7 @@ endfunction()
 function(narpa_export name)
   set_target_properties(narpa_${name} PROPERTIES EXPORT_NAME ${name})
   string(REGEX REPLACE "_.*" "" component ${name})
-  install(TARGETS narpa_${name} EXPORT narpa-${component})
+  install(TARGETS narpa_${name} EXPORT narpa-${component} COMPONENT dev)
   set_property(GLOBAL APPEND PROPERTY NARPA_COMPONENTS ${component})
 endfunction()
 
@@ -158,7 +158,8 @@ function(narpa_install_package)
   get_property(all_links GLOBAL PROPERTY NARPA_LINKS)
   set(narpa_components "set(narpa_components ${components})\n")
   foreach(component ${components})
-    install(EXPORT narpa-${component} NAMESPACE narpa:: DESTINATION ${dir} FILE narpa-${component}.cmake)
+    install(EXPORT narpa-${component} NAMESPACE narpa:: DESTINATION ${dir} FILE narpa-${component}.cmake
+            COMPONENT dev)
     set(uses "")
     foreach(entry ${all_links})
       if(entry MATCHES "^${component}[/:]")
@@ -179,10 +180,11 @@ function(narpa_install_package)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/narpaConfig.cmake.in ${CMAKE_BINARY_DIR}/narpaConfig.cmake
                                 INSTALL_DESTINATION ${dir})
   write_basic_package_version_file(${CMAKE_BINARY_DIR}/narpaConfigVersion.cmake COMPATIBILITY SameMajorVersion)
-  install(FILES ${CMAKE_BINARY_DIR}/narpaConfig.cmake ${CMAKE_BINARY_DIR}/narpaConfigVersion.cmake DESTINATION ${dir})
+  install(FILES ${CMAKE_BINARY_DIR}/narpaConfig.cmake ${CMAKE_BINARY_DIR}/narpaConfigVersion.cmake DESTINATION ${dir}
+          COMPONENT dev)
   include(${PROJECT_SOURCE_DIR}/cmake/PublicHeaders.cmake)
   list(JOIN NARPA_PUBLIC_HEADERS "$<SEMICOLON>" headers)
   install(CODE "execute_process(COMMAND \${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR}
     \"-DDESTINATION=\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_INCLUDEDIR}\" \"-DHEADERS=${headers}\"
-    -P ${PROJECT_SOURCE_DIR}/cmake/InstallHeaders.cmake COMMAND_ERROR_IS_FATAL ANY)")
+    -P ${PROJECT_SOURCE_DIR}/cmake/InstallHeaders.cmake COMMAND_ERROR_IS_FATAL ANY)" COMPONENT dev)
 endfunction()

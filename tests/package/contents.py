@@ -30,6 +30,8 @@ for name in [
     "share/narpa/examples/dynamics.py", "share/narpa/python/narpa/can.py",
     "share/narpa/scenes/docking/docking.toml", "share/narpa/scenes/docking/station.obj",
     "share/narpa/scenes/rehearsal/docking.toml",
+    "share/man/man1/narpa.1", "share/man/man1/narpa-render.1", "share/man/man1/narpa-navigation.1",
+    "lib/systemd/system/narpa@.service", "lib/udev/rules.d/70-narpa-usb.rules",
 ]:  # fmt: skip
     if not (prefix / name).is_file():
         wrong.append(f"{name} is missing")
@@ -39,6 +41,24 @@ COMPILED = "import narpa; from narpa import dbc; dbc.read(); assert narpa.load_s
 
 if (prefix / "lib/libnarpa_bench.a").exists():
     wrong.append("lib/libnarpa_bench.a is installed, though nothing uses it")
+
+page = (prefix / "share/man/man1/narpa-render.1").read_text()
+for part in (".TH NARPA-RENDER 1", "\n.SH NAME\n", "\n.SH \"OPTIONS\"\n", "\\-\\-camera NAME"):
+    if part not in page:
+        wrong.append(f"narpa-render.1 has no {part!r}")
+
+
+def completions(*words):
+    """What bash offers for the last word."""
+    script = """source "$0"; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _narpa; printf '%s\\n' "${COMPREPLY[@]}" """
+    ran = subprocess.run(["bash", "-c", script, prefix / "share/bash-completion/completions/narpa", prefix / "bin/narpa", *words],
+                         cwd=prefix, capture_output=True, text=True)  # fmt: skip
+    return ran.stdout.split()
+
+
+for words, expected in [(["reh"], ["rehearse"]), (["render", "--came"], ["--camera"]), (["render", "corn"], ["cornell"])]:
+    if completions(*words) != expected:
+        wrong.append(f"completion of {words} offers {completions(*words)}, expected {expected}")
 
 for program in (prefix / "bin").iterdir():
     if b".debug_info" in program.read_bytes():

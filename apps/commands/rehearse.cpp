@@ -3,10 +3,14 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "apps/cli.h"
 #include "apps/commands/rehearsal_text.h"
 #include "apps/scene_argument.h"
+#include "apps/slurm.h"
 #include "apps/warnings.h"
+#include "base/file_bytes.h"
 #include "rehearsal/runner/campaign.h"
 #include "rehearsal/runner/merge.h"
 #include "rehearsal/runner/rehearsal.h"
@@ -22,6 +26,9 @@ struct RehearseOptions {
     std::size_t runs = 0;  ///< 0: one, without a summary
     int jobs = 1;
     bool replace = false;
+    std::string shard = "1/1";  ///< of the runs
+    bool gather = false;        ///< only summarises
+    SlurmOptions slurm;
     std::vector<std::string> merge;  ///< campaigns to summarise together; nothing is flown
 };
 
@@ -62,6 +69,67 @@ Outcome many(const rehearsal::CampaignOptions& options) {
     return print_campaign(std::move(summary), options.run.folder);
 }
 
+Outcome one_shard(const rehearsal::CampaignOptions& options) {
+    auto flown = [&] {
+        Progress progress("rehearsing");
+        progress.show("starting");
+        return rehearsal::fly_shard(options, console(progress), stop_flag());
+    }();
+    if (!flown) return flown;
+    say(fmt::format("{}: flew {} of the {} runs of shard {}; {}", options.run.folder, (*flown)["flown"].dump(),
+                    (*flown)["runs"].dump(), options.shard.text(),
+                    (*flown)["passed"].get<bool>() ? "the others were there" : "some have no result"));
+    return flown;
+}
+
+/// The summary that the job on the cluster has written.
+Outcome gathered(const rehearsal::CampaignOptions& options, int status) {
+    const std::string file = options.run.folder + "/summary.json";
+    if (status > 1)
+        return Error{fmt::format("the job that gathers ended with status {}", status),
+                     options.run.folder + "/slurm/gather.log", 0, 0, ErrorKind::failed};
+    const auto text = read_file(file);
+    if (!text) return text.error();
+    nlohmann::json summary = nlohmann::json::parse(*text, nullptr, false);
+    if (!summary.is_object()) return Error{"is not a summary", file, 0, 0, ErrorKind::failed};
+    return print_campaign(std::move(summary), options.run.folder);
+}
+
+/// Submits the runs that are missing.
+Outcome on_cluster(const rehearsal::CampaignOptions& options, const SlurmOptions& slurm) {
+    const rehearsal::RehearsalOptions& r = options.run;
+    if (r.bus != "slcan:0" || !r.video.empty())
+        return Error{"--on slurm: runs on other machines have no device of this one, expected no --can or --video"};
+    if (auto good = slurm.check(); !good) return good.error();
+    if (auto opened = rehearsal::open_campaign(r.folder); !opened) return opened.error();
+    if (auto good = check_not_queued(r.folder); !good) return good.error();
+    auto plan = rehearsal::plan_campaign(options);
+    if (!plan) return plan.error();
+    if (plan->missing.empty()) return print_campaign(rehearsal::gather_campaign(options), r.folder);
+    const std::uint32_t shards = std::min(static_cast<std::uint32_t>(slurm.max_jobs.value_or(1000)),
+                                          static_cast<std::uint32_t>(options.runs));
+    SlurmWork work{r.folder,
+                   plan->scenario.name,
+                   rehearsal::rehearse_arguments(r),
+                   r.threads == 0,
+                   {},
+                   std::move(plan->missing),
+                   shards};
+    work.part.insert(work.part.end(), {"--runs", std::to_string(options.runs), "-o", r.folder});
+    if (r.seed) work.part.insert(work.part.end(), {"--seed", std::to_string(*r.seed)});
+    if (options.replace) work.part.emplace_back("--replace");
+    work.gather = work.part;
+    work.gather.emplace_back("--gather");
+    if (r.threads > 0) work.part.insert(work.part.end(), {"--threads", std::to_string(r.threads)});
+    const auto jobs = submit_to_slurm(slurm, work);
+    if (!jobs) return jobs.error();
+    say(submitted_text(*jobs, fmt::format("{} runs", work.missing.size()), r.folder));
+    if (!slurm.wait) return to_json(*jobs);
+    const auto status = wait_for_slurm(*jobs, r.folder);
+    if (!status) return status.error();
+    return gathered(options, *status);
+}
+
 /// With --strict, the warnings of the scene, which the emulator's log has otherwise, are an Error.
 Status warn_of_scene(const rehearsal::Scenario& scenario, bool strict) {
     if (!strict) return Ok{};
@@ -92,7 +160,13 @@ Outcome rehearse(const RehearseOptions& given) {
     if (auto good = warn_of_scene(*scenario, given.strict); !good) return good.error();
     if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name + (given.runs > 0 ? "-campaign" : "");
     stop_on_signals();
-    return given.runs > 0 ? many({o, given.runs, given.jobs, given.replace}) : one(o);
+    if (given.runs == 0) return one(o);
+    const auto shard = shard_from(given.shard);
+    if (!shard) return shard.error();
+    const rehearsal::CampaignOptions campaign{o, given.runs, given.jobs, given.replace, *shard};
+    if (!given.slurm.on.empty()) return on_cluster(campaign, given.slurm);
+    if (given.gather) return print_campaign(rehearsal::gather_campaign(campaign), o.folder);
+    return shard->count > 1 ? one_shard(campaign) : many(campaign);
 }
 
 }  // namespace
@@ -132,7 +206,17 @@ Command add_rehearse(Parser app) {
         "Of runs that pass keep only records, result and scenario (20 KB in place of 8 MB): in lockstep the seed "
         "repeats the rest");
     c.flag("--keep-frames", r.keep_frames, "Keep the frames that the navigation gets, as emulator/CAMERA.y4m");
-    c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
+    const Option jobs = c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
+    const Option shard =
+        c.option("--shard", o->shard,
+                 "Fly the K-th of M parts of the runs, those whose number - 1 has the remainder K - 1, without a "
+                 "summary. Parts may be flown at once, on machines that share the folder")
+            .type_name("K/M")
+            .needs(runs);
+    const Option gather =
+        c.flag("--gather", o->gather, "Fly nothing: summarise the runs of DIR that there are").needs(runs);
+    gather.excludes(shard);
+    o->slurm.add_to(c, "1000").needs(runs).excludes(jobs).excludes(shard).excludes(gather);
     c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2 | usb:[ADAPTER]")
         .type_name("BUS")
         .shows_default();
@@ -157,6 +241,7 @@ Command add_rehearse(Parser app) {
     c.group("Start here");
     c.examples({"narpa rehearse docking -o out/docking", "narpa rehearse realtime --real-time",
                 "narpa rehearse dispersions --runs 100 --jobs 2",
+                "narpa rehearse dispersions --runs 10000 --on slurm --lean -o /shared/campaign",
                 "narpa rehearse docking-camera --navigation 'python3 my_navigation.py $BUS $VIDEO'"});
     return [o, strict] {
         o->strict = strict.given();

@@ -61,19 +61,6 @@ Status make_folder(const fs::path& folder) {
 
 }  // namespace
 
-Result<Shard> shard_from(const std::string& text) {
-    Shard shard;
-    const std::size_t slash = std::min(text.find('/'), text.size());
-    const char *const first = text.data(), *const last = first + text.size();
-    const auto [k_end, k_error] = std::from_chars(first, first + slash, shard.index);
-    const auto [m_end, m_error] = std::from_chars(std::min(first + slash + 1, last), last, shard.count);
-    if (k_error != std::errc{} || m_error != std::errc{} || k_end != first + slash || m_end != last ||
-        shard.index < 1 || shard.index > shard.count)
-        return Error{fmt::format("--shard \"{}\", expected K/M with 1 <= K <= M, like 2/8", text)};
-    --shard.index;
-    return shard;
-}
-
 Result<Manifest> read_manifest(const std::string& folder) {
     const std::string path = (fs::path(folder) / kManifest).string();
     const auto text = read_file(path);

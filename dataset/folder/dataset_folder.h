@@ -10,17 +10,10 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/shard.h"
 #include "dataset/recipe/recipe.h"
 
 namespace narpa::dataset {
-
-/// The part of the images that one process makes: those whose number is `index` modulo `count`.
-struct Shard {
-    std::uint32_t index = 0, count = 1;  ///< 0 <= index < count
-    [[nodiscard]] bool has(std::uint32_t image) const { return image % count == index; }
-};
-/// "2/8" is the second of eight. Error: expected K/M with 1 <= K <= M.
-[[nodiscard]] Result<Shard> shard_from(const std::string& text);
 
 /// dataset.json.
 struct Manifest {
@@ -34,7 +27,7 @@ struct Manifest {
 /// it has are good, fewer are an Error; so are another recipe and other scene files.
 [[nodiscard]] Status open_dataset(const std::string& folder, const Manifest& manifest);
 
-/// What a shard still has to do.
+/// What a shard, the images of its numbers, still has to do.
 struct Plan {
     std::uint32_t images = 0;              ///< of the shard
     std::vector<std::uint32_t> missing{};  ///< those that lack a file

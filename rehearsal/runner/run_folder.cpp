@@ -90,16 +90,17 @@ Result<std::string> difference_from_flown(const std::string& folder, const Scena
     return fmt::format("{}", fmt::join(differ, ", "));
 }
 
-Result<Descriptor> lock_folder(const std::string& folder) {
+Result<Descriptor> lock_folder(const std::string& folder, Lock lock) {
     std::error_code failed;
     fs::create_directories(folder, failed);
     if (failed) return Error{"cannot be made: " + failed.message(), folder};
-    Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (!lock) return Error{fmt::format("cannot be read: {}", std::strerror(errno)), folder};
+    Descriptor held(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!held) return Error{fmt::format("cannot be read: {}", std::strerror(errno)), folder};
     // Some network file systems have no locks: there the folder is used unlocked.
-    if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    const int mode = lock == Lock::shared ? LOCK_SH : LOCK_EX;
+    if (::flock(held.get(), mode | LOCK_NB) != 0 && errno == EWOULDBLOCK)
         return Error{"is in use by another run that has not ended, expected a folder of its own for each", folder};
-    return lock;
+    return held;
 }
 
 Result<FolderKind> kind_of_folder(const std::string& folder) {
@@ -111,14 +112,14 @@ Result<FolderKind> kind_of_folder(const std::string& folder) {
         folder};
 }
 
-Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind) {
-    auto lock = lock_folder(folder);
-    if (!lock) return lock;
+Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind, Lock lock) {
+    auto locked = lock_folder(folder, lock);
+    if (!locked) return locked;
     std::error_code failed;
     const bool empty = fs::is_empty(folder, failed);
     if (failed) return Error{"cannot be read: " + failed.message(), folder};
     const auto held = kind_of_folder(folder);
-    if (empty || (held && *held == kind)) return lock;
+    if (empty || (held && *held == kind)) return locked;
     return Error{fmt::format("holds {}, expected a new or empty folder, or that of {}",
                              held ? kKindNames[static_cast<std::size_t>(*held)] : "other files",
                              kKindNames[static_cast<std::size_t>(kind)]),

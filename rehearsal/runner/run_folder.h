@@ -10,13 +10,15 @@
 
 namespace narpa::rehearsal {
 
+/// Whether other programs may have the lock at the same time, all of them `shared`.
+enum class Lock : std::uint8_t { exclusive, shared };
 /// Creates the folder and locks it until the descriptor closes; an Error if another program has locked it.
-Result<Descriptor> lock_folder(const std::string& folder);
+Result<Descriptor> lock_folder(const std::string& folder, Lock lock = Lock::exclusive);
 /// What a folder of results holds; the last: only the summary of campaigns elsewhere.
 enum class FolderKind : std::uint8_t { run, campaign, summary };
 
 /// The same for a folder that is empty or of this kind; an Error if it holds other files.
-Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind);
+Result<Descriptor> claim_folder(const std::string& folder, FolderKind kind, Lock lock = Lock::exclusive);
 /// An Error if it holds no results.
 Result<FolderKind> kind_of_folder(const std::string& folder);
 

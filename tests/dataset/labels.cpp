@@ -70,6 +70,15 @@ TEST(Shards, DivideTheImages) {
     }
 }
 
+TEST(Shards, AreListedWhereTheyHaveAnItem) {
+    const std::vector<Shard> shards = shards_with({1, 9, 4, 5}, 4);
+    std::vector<std::string> texts;
+    for (const Shard& s : shards) texts.push_back(s.text());
+    EXPECT_EQ(texts, (std::vector<std::string>{"1/4", "2/4"}));
+    EXPECT_TRUE(shards_with({}, 4).empty());
+    EXPECT_EQ(shards_with({0, 1, 2}, 1).size(), 1u);
+}
+
 TEST(DatasetFolders, KnowWhatIsMissing) {
     const TemporaryFolder folder;
     const std::string path = folder / "set";

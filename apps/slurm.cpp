@@ -146,10 +146,11 @@ Result<std::vector<std::string>> queued(const std::string& jobs) {
 Option SlurmOptions::add_to(Parser command, const std::string& default_jobs) {
     const Option where =
         command
-            .option("--on", on,
-                    "Make the parts on the nodes of a Slurm cluster, as the tasks of a job array, and gather them "
-                    "in a job after it; -o DIR is on a path that the nodes share")
-            .type_name("slurm[:PARTITION]")
+            .option(
+                "--on", on,
+                "slurm or slurm:PARTITION: make the parts on the nodes of a cluster, as the tasks of a job array, "
+                "and gather them in a job after it; -o DIR is on a path that the nodes share")
+            .type_name("CLUSTER")
             .check([](const std::string& text) {
                 const bool good = text == kSlurm || (text.starts_with("slurm:") && text.size() > 6);
                 return good ? std::string() : "expected slurm or slurm:PARTITION, got " + text;

@@ -12,6 +12,7 @@
 #include "drivers/lidar/packet_sink.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/camera/camera_sensor.h"
+#include "emulator/lidar/lidar_sensor.h"
 #include "emulator/log/run_record.h"
 #include "emulator/threads.h"
 
@@ -99,6 +100,8 @@ Status Emulator::open() {
     if (sensors_.all.empty())
         return Error{"no output, expected at least one --video CAMERA=SINK or --lidar LIDAR=SINK"};
     if (auto opened = open_observers(); !opened) return opened;
+    if (!options_.mcap.empty())
+        if (auto opened = open_mcap(); !opened) return opened;
     if (logs)  // last, so that a run that cannot start keeps the log of an earlier one
         if (auto opened = open_logs(); !opened) return opened;
     if (!bus_) return Ok{};
@@ -133,6 +136,18 @@ Status Emulator::open_logs() {
     auto log = RowLog::create(folder + "/can.log", "", options_.lockstep, CanNode::kLogLines);
     if (!log) return log.error();
     can_log_ = *std::move(log);
+    return Ok{};
+}
+
+Status Emulator::open_mcap() {
+    std::vector<std::size_t> cameras, lidars;
+    for (const CameraSensor* camera : sensors_.cameras) cameras.push_back(camera->index());
+    for (const LidarSensor* lidar : sensors_.lidars) lidars.push_back(lidar->index());
+    auto log = McapLog::create(options_.mcap, world_->scene(), cameras, lidars, options_.lockstep);
+    if (!log) return log.error();
+    mcap_ = *std::move(log);
+    for (const auto& sensor : sensors_.all) sensor->record_to(*mcap_);
+    for (const auto& feed : observers_) feed->observer().record_to(*mcap_);
     return Ok{};
 }
 
@@ -201,6 +216,13 @@ Status Emulator::finish() {
     for (const auto& sensor : sensors_.all) keep_first(sensor->finish());
     for (const auto& feed : observers_) keep_first(feed->observer().finish());
     if (can_log_) keep_first(can_log_->close());
+    if (mcap_) {
+        keep_first(mcap_->close());
+        if (const std::uint64_t n = mcap_->dropped(); n > 0)
+            notices_.push_back(fmt::format(
+                "frames and packets that are not in {}, because the disk or the compression was too slow: {}",
+                mcap_->path(), n));
+    }
     return status;
 }
 

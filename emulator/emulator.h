@@ -10,6 +10,7 @@
 #include "base/result.h"
 #include "base/stop.h"
 #include "emulator/bus/can_node.h"
+#include "emulator/log/mcap_log.h"
 #include "emulator/realtime.h"
 #include "emulator/sensor_kind.h"
 
@@ -45,6 +46,8 @@ public:
     [[nodiscard]] const std::vector<CameraSensor*>& cameras() const noexcept { return sensors_.cameras; }
     [[nodiscard]] const std::vector<LidarSensor*>& lidars() const noexcept { return sensors_.lidars; }
     [[nodiscard]] const std::vector<std::unique_ptr<FrameFeed>>& observers() const noexcept { return observers_; }
+    /// Null without RunOptions::mcap.
+    [[nodiscard]] const McapLog* mcap() const noexcept { return mcap_.get(); }
     [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
     /// Simulation time reached. From any thread.
     [[nodiscard]] std::int64_t t_ns() const noexcept { return t_ns_.load(std::memory_order_relaxed); }
@@ -75,6 +78,7 @@ private:
     Status open_observers();
     /// Replaces the logs of an earlier run in the folder.
     Status open_logs();
+    Status open_mcap();
 
     void run_real_time(const StopFlag& stop);
     void become_real_time(const char* name, int priority);
@@ -107,6 +111,7 @@ private:
     std::unique_ptr<CanBus> bus_;
     std::unique_ptr<RowLog> can_log_;
     std::unique_ptr<CanNode> can_;
+    std::unique_ptr<McapLog> mcap_;
     std::span<const SensorKind> kinds_;
     OpenSensors sensors_;
     std::vector<std::unique_ptr<FrameFeed>> observers_;

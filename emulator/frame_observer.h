@@ -21,6 +21,7 @@
 namespace narpa {
 
 class CanNode;
+class McapLog;
 
 /// Observes the frames of one camera. One thread at a time calls it, except for send_telemetry.
 class FrameObserver {
@@ -37,6 +38,8 @@ public:
     /// Creates its logs in this folder, before the run; without this call there are none. `wait_when_full`:
     /// RowLog::create.
     virtual Status log_to(const std::string& /*folder*/, bool /*wait_when_full*/) { return Ok{}; }
+    /// Gives what it finds to this log too, which outlives the run. Called before the run.
+    virtual void record_to(McapLog& /*log*/) {}
     /// A frame that was handed over, and where the bodies were at mid-exposure. In lockstep every frame, from the
     /// loop, which waits. In real time on a thread of its own, without priority and in a TBB arena of one thread;
     /// frames that come while it is busy are skipped.

@@ -91,7 +91,8 @@ json report(const Emulator& emulator) {
         {"advice", advice(emulator)},
         {"failures", failures(emulator)},
         {"passed", failures(emulator).empty()},
-        {"log", emulator.options().log_folder}};
+        {"log", emulator.options().log_folder},
+        {"mcap", emulator.mcap() ? emulator.mcap()->report() : json(nullptr)}};
     for (const SensorKind& kind : emulator.kinds()) document[std::string(kind.name) + "s"] = json::array();
     for (const auto& feed : emulator.observers())
         document[std::string(feed->observer().name())] = feed->observer().report(feed->skipped());
@@ -134,6 +135,7 @@ std::string to_text(const Emulator& emulator) {
     for (const std::string& notice : emulator.notices()) out += "  note: " + notice + "\n";
     for (const std::string& text : advice(emulator)) out += "  advice: " + text + "\n";
     for (const std::string& text : failures(emulator)) out += "  failed: " + text + "\n";
+    if (emulator.mcap()) out += emulator.mcap()->to_text();
     if (!emulator.options().log_folder.empty()) out += "  log: " + emulator.options().log_folder + "\n";
     return out;
 }

@@ -20,6 +20,7 @@ struct RunOptions {
     bool lockstep = false;
     double duration_s = 0;   ///< of simulation time; 0: until stopped or until a recorded bus ends
     std::string log_folder;  ///< empty: no log
+    std::string mcap{};      ///< MCAP file; empty: none
     bool log_shots = false;  ///< logs the truth of every LiDAR shot too, at the cost of a second ray for each
     std::optional<double> late_max{};  ///< part of a camera's frames that may be late or skipped; empty: any
     int threads = 0;                   ///< tracing threads; 0: one per core, or one per entry of `cpus`

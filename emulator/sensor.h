@@ -14,6 +14,7 @@
 namespace narpa {
 
 class CanNode;
+class McapLog;
 struct Heartbeat;
 
 /// How a sensor runs in real time: on a thread of its own.
@@ -37,6 +38,9 @@ public:
     /// Creates its logs in this folder. Called before `warm_up`; without this call there are no logs.
     /// `wait_when_full`: RowLog::create.
     virtual Status log_to(const std::string& /*folder*/, bool /*wait_when_full*/) { return Ok{}; }
+
+    /// Gives its items to this log too, which outlives the run. Called before `warm_up`.
+    virtual void record_to(McapLog& /*log*/) {}
 
     // The schedule of the next item, simulation time in ns.
 

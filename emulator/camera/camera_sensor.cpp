@@ -8,6 +8,7 @@
 
 #include "emulator/bus/can_node.h"
 #include "emulator/log/ledger_log.h"
+#include "emulator/log/mcap_log.h"
 #include "emulator/trajectory.h"
 #include "renderer/camera/read_out.h"
 
@@ -70,6 +71,10 @@ Status CameraSensor::log_to(const std::string& folder, bool wait_when_full) {
     return Ok{};
 }
 
+void CameraSensor::record_to(McapLog& log) {
+    mcap_ = &log.source_of_camera(index_);
+}
+
 void CameraSensor::start_at(std::int64_t t_ns) noexcept {
     const std::int64_t period = unit_.camera().period_ns;
     next_ = static_cast<std::uint32_t>(std::max<std::int64_t>(0, (t_ns + period - 1) / period));
@@ -126,6 +131,7 @@ void CameraSensor::make_next(const Clock& clock) {
     stats_.send.add(monotonic_ns() - wall_ready);
     account(ledger);
     log(ledger);
+    if (mcap_) mcap_->frame(ledger, unit_.bytes(), unit_.placement());
     if (ledger.delivery == Delivery::frame)
         for (FrameFeed* feed : feeds_) feed->take(ledger, unit_.bytes(), unit_.placement());
     std::optional<double> level;

@@ -38,6 +38,8 @@ struct CameraStats {
     Histogram error_1e9, samples_1e3;  ///< expected error, 1e-9 of full scale; samples per pixel, 1e-3
 };
 
+class McapSource;
+
 class CameraSensor final : public Sensor {
 public:
     /// `late_max`: RunOptions::late_max.
@@ -55,6 +57,7 @@ public:
     [[nodiscard]] std::vector<std::string> outputs() const override { return descriptions(sinks_); }
     /// Truth (trajectory CSV), ledger (CSV) and contact sheet.
     Status log_to(const std::string& folder, bool wait_when_full) override;
+    void record_to(McapLog& log) override;
     void start_at(std::int64_t t_ns) noexcept override;
     void plan() noexcept override;
     [[nodiscard]] std::int64_t schedule_holds_ns() const noexcept override {
@@ -123,6 +126,7 @@ private:
     bool keeps_ledgers_ = false;
     std::uint8_t requests_ = 0;  ///< made by readers so far; used by the CAN thread
     std::vector<FrameFeed*> feeds_;
+    McapSource* mcap_ = nullptr;
     CameraStats stats_;
     /// What `progress` shows of the last frame and of all.
     struct Shown {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "emulator/bus/can_node.h"
+#include "emulator/log/mcap_log.h"
 
 namespace narpa {
 
@@ -38,7 +39,8 @@ Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
 
 LidarSensor::LidarSensor(const World& world, std::size_t lidar, std::vector<std::unique_ptr<PacketSink>> sinks,
                          bool log_shots, OnPacket on_packet)
-    : lidar_(static_cast<std::uint8_t>(lidar)),
+    : world_(world),
+      lidar_(static_cast<std::uint8_t>(lidar)),
       unit_(world, lidar, log_shots || on_packet),
       sinks_(std::move(sinks)),
       logs_shots_(log_shots),
@@ -49,6 +51,10 @@ Status LidarSensor::log_to(const std::string& folder, bool wait_when_full) {
     if (!log) return log.error();
     log_ = *std::move(log);
     return Ok{};
+}
+
+void LidarSensor::record_to(McapLog& log) {
+    mcap_ = &log.source_of_lidar(lidar_);
 }
 
 void LidarSensor::start_at(std::int64_t t_ns) noexcept {
@@ -78,6 +84,7 @@ void LidarSensor::make_next(const Clock& clock) {
     if (keeps_beams_) report_beams();
     if (on_packet_) on_packet_(unit_, next_);
     if (log_) log_->add(unit_, next_, due, now, late, lost());
+    if (mcap_) mcap_->packet(world_, lidar_, unit_, next_, now);
     ++next_;
     if (due_ns() + kMaxLagNs < now) {  // skip what is long overdue rather than send it in a burst
         const std::int64_t before = next_;

@@ -26,6 +26,8 @@ struct LidarStats {
     Histogram wake_late, fire, hand_over;  ///< after it was due; duration; from due to sent
 };
 
+class McapSource;
+
 class LidarSensor final : public Sensor {
 public:
     using OnPacket = std::function<void(const LidarUnit&, std::int64_t packet)>;
@@ -43,6 +45,7 @@ public:
     [[nodiscard]] std::vector<std::string> outputs() const override;
     /// Sweeps, and shots where it was made to log them.
     Status log_to(const std::string& folder, bool wait_when_full) override;
+    void record_to(McapLog& log) override;
     void start_at(std::int64_t t_ns) noexcept override;
     /// All shots of the packet come before it is complete.
     [[nodiscard]] std::int64_t last_pose_ns() const noexcept override { return due_ns() - 1; }
@@ -57,6 +60,8 @@ public:
     [[nodiscard]] nlohmann::json report() const override;
     [[nodiscard]] std::string to_text(bool lockstep) const override;
 
+    /// In the scene.
+    [[nodiscard]] std::size_t index() const noexcept { return lidar_; }
     [[nodiscard]] const LidarStats& stats() const noexcept { return stats_; }
     [[nodiscard]] double sweeps() const noexcept {
         return static_cast<double>(stats_.packets) * static_cast<double>(unit_.packet_period_ns()) * 1e-9 *
@@ -67,6 +72,7 @@ public:
     static constexpr std::int64_t kMaxLagNs = 100'000'000;
 
 private:
+    const World& world_;
     std::uint8_t lidar_;  ///< index in the scene
     LidarUnit unit_;
     std::vector<std::unique_ptr<PacketSink>> sinks_;
@@ -76,6 +82,7 @@ private:
     std::int64_t next_ = 0;
     LidarStats stats_;
     std::unique_ptr<SweepLog> log_;  ///< null without a log
+    McapSource* mcap_ = nullptr;
     bool logs_shots_;
     OnPacket on_packet_;
     bool keeps_beams_ = false;

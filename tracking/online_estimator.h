@@ -17,6 +17,8 @@
 
 namespace narpa {
 
+class McapSource;
+
 class OnlineEstimator final : public FrameObserver {
 public:
     OnlineEstimator(std::unique_ptr<FrameTracker> tracker, const World& world, std::size_t camera, bool lockstep);
@@ -26,6 +28,7 @@ public:
     [[nodiscard]] std::size_t camera() const noexcept override { return index_; }
     /// CAMERA.estimate.csv, and after the run CAMERA.estimate.png.
     Status log_to(const std::string& folder, bool wait_when_full) override;
+    void record_to(McapLog& log) override;
     void observe(const FrameLedger& ledger, std::span<const std::uint8_t> bytes, const BodyPoses& at) override;
     void send_telemetry(CanNode& can, std::int64_t t_ns) noexcept override;
     Status finish() override;
@@ -38,9 +41,14 @@ public:
     static constexpr std::size_t kMaxKept = 100'000;
 
 private:
+    void record(const TrackedFrame& tracked, std::int64_t t_publish_ns);
+
     std::unique_ptr<FrameTracker> tracker_;
     std::size_t index_;
     std::string camera_, target_, title_;
+    std::string camera_frame_, target_frame_;
+    McapSource* mcap_ = nullptr;
+    std::uint16_t estimate_channel_ = 0, pose_channel_ = 0;
     /// In real time: OpenCV's workers with the sensors' priority would delay the sensors.
     std::optional<SingleThreadedOpenCv> single_threaded_;
     SpscRing<EstimateReport, 64> reports_;

@@ -30,6 +30,15 @@ void DeviceOptions::add_to(Parser c) {
         .repeatable();
 }
 
+Option add_mcap_to(Parser c, std::string& file) {
+    return c
+        .option(
+            "--mcap", file,
+            "Also write an MCAP file that Foxglove opens: images, calibrations, point clouds, transforms, ledgers, "
+            "estimates")
+        .type_name("FILE.mcap");
+}
+
 Result<DeviceOptions::Outputs> DeviceOptions::video() const {
     return split(video_texts, "CAMERA=SINK, like nav=/dev/video10");
 }

@@ -1,4 +1,4 @@
-/// apps/device_options.h - the bus and the sinks of `narpa run` and `narpa check`.
+/// apps/device_options.h - the bus, the sinks and the MCAP file of commands that run the emulator.
 #pragma once
 
 #include <string>
@@ -21,5 +21,8 @@ struct DeviceOptions {
     [[nodiscard]] Result<Outputs> video() const;
     [[nodiscard]] Result<Outputs> lidar() const;
 };
+
+/// --mcap. `file`: empty where it is not given.
+Option add_mcap_to(Parser command, std::string& file);
 
 }  // namespace narpa::cli

@@ -7,6 +7,7 @@
 
 #include "apps/cli.h"
 #include "apps/commands/rehearsal_text.h"
+#include "apps/device_options.h"
 #include "apps/scene_argument.h"
 #include "apps/slurm.h"
 #include "apps/warnings.h"
@@ -158,6 +159,7 @@ Outcome rehearse(const RehearseOptions& given) {
     auto scenario = rehearsal::read_scenario(o.scenario, o.overrides);
     if (!scenario) return scenario.error();
     if (auto good = warn_of_scene(*scenario, given.strict); !good) return good.error();
+    if (auto made = make_folder_of(o.mcap); !made) return made.error();
     if (o.folder.empty()) o.folder = "out/rehearsal/" + scenario->name + (given.runs > 0 ? "-campaign" : "");
     stop_on_signals();
     if (given.runs == 0) return one(o);
@@ -206,6 +208,7 @@ Command add_rehearse(Parser app) {
         "Of runs that pass keep only records, result and scenario (20 KB in place of 8 MB): in lockstep the seed "
         "repeats the rest");
     c.flag("--keep-frames", r.keep_frames, "Keep the frames that the navigation gets, as emulator/CAMERA.y4m");
+    add_mcap_to(c, r.mcap).excludes(runs);
     const Option jobs = c.option("--jobs", o->jobs, "Runs at the same time").range(1, 256).needs(runs);
     const Option shard =
         c.option("--shard", o->shard,

@@ -7,6 +7,8 @@
 #include <string_view>
 
 #include "apps/cli.h"
+#include "apps/device_options.h"
+#include "emulator/log/mcap_log.h"
 #include "emulator/replay/replay_report.h"
 #include "emulator/threads.h"
 #include "rehearsal/runner/rerun.h"
@@ -20,6 +22,7 @@ constexpr int kFramesCompared = 10;  ///< by default
 struct ReplayOptions {
     std::string folder, camera, scene, picture;
     std::string dynamics, navigation;  ///< commands that replace ours in a lockstep rehearsal
+    std::string mcap;
     int reference = 0, frames = 0, threads = 0;
 };
 
@@ -45,7 +48,41 @@ std::vector<std::size_t> frames_for(const ReplayOptions& o, std::size_t logged) 
     return chosen_frames(logged, o.reference > 0 ? std::size_t{kFramesCompared} : logged);
 }
 
-Replayed render_again(const ReplayOptions& o, Replay& run) {
+/// The file of --mcap, made with the first camera that is replayed.
+class McapOfReplay {
+public:
+    McapOfReplay(const std::string& path, const std::vector<std::string>& cameras)
+        : path_(path), cameras_(cameras) {}
+
+    /// Where the frames of this camera go; null: nowhere.
+    Result<McapSource*> source_for(const Replay& run) {
+        if (path_.empty()) return static_cast<McapSource*>(nullptr);
+        const Scene& scene = run.world().scene();
+        if (!log_) {
+            std::vector<std::size_t> indices;
+            for (std::size_t i = 0; i < scene.cameras.size(); ++i)
+                if (i == run.camera_index() || std::ranges::count(cameras_, scene.cameras[i].name) > 0)
+                    indices.push_back(i);
+            auto log = McapLog::create(path_, scene, indices, {}, true);
+            if (!log) return log.error();
+            log_ = *std::move(log);
+        }
+        return &log_->source_of_camera(run.camera_index());
+    }
+    Status close() {
+        if (!log_) return Ok{};
+        Status closed = log_->close();
+        if (closed) say("wrote " + path_);
+        return closed;
+    }
+
+private:
+    std::string path_;
+    std::vector<std::string> cameras_;
+    std::unique_ptr<McapLog> log_;
+};
+
+Replayed render_again(const ReplayOptions& o, Replay& run, McapSource* mcap) {
     TracingThreads threads(o.threads);
     Progress progress(fmt::format("rendering {} again", o.folder));
     const std::vector<std::size_t> chosen = frames_for(o, run.frames().size());
@@ -63,6 +100,7 @@ Replayed render_again(const ReplayOptions& o, Replay& run) {
         ReplayedFrame frame{run.frames()[i], {}, {}};
         threads.arena.execute([&] {
             frame.differs = run.make(i);
+            if (mcap) mcap->frame(frame.logged.ledger, run.bytes(), run.placement(i));
             if (o.reference > 0) frame.compared = run.against(o.reference);
         });
         done.frames.push_back(std::move(frame));
@@ -116,7 +154,7 @@ LoggedSensors sensors_in(const std::string& folder) {
     return found;
 }
 
-Outcome replay_camera(const ReplayOptions& o) {
+Outcome replay_camera(const ReplayOptions& o, McapOfReplay& mcap) {
     auto run = Replay::open(o.folder, o.camera, o.scene);
     if (!run) return run.error();
     const std::string& camera = (*run)->camera().name;
@@ -125,7 +163,9 @@ Outcome replay_camera(const ReplayOptions& o) {
         say(fmt::format("warning: {} is not what it was in the run", file));
     if ((*run)->frames().empty()) return Error{fmt::format("holds no frame of camera \"{}\"", camera), log};
 
-    const Replayed done = render_again(o, **run);
+    const auto source = mcap.source_for(**run);
+    if (!source) return source.error();
+    const Replayed done = render_again(o, **run, *source);
     const auto repeated = static_cast<std::size_t>(
         std::count_if(done.frames.begin(), done.frames.end(), [](const auto& f) { return f.differs.empty(); }));
     const bool passed = repeated > 0 && repeated == done.frames.size() && done.forged.empty();
@@ -166,15 +206,17 @@ Outcome replay_camera(const ReplayOptions& o) {
 
 /// Replays several cameras; `cameras` of the document has an entry for each.
 Outcome replay_cameras(ReplayOptions o, const std::vector<std::string>& cameras) {
+    McapOfReplay mcap(o.mcap, cameras);
     bool passed = true;
     nlohmann::json documents = nlohmann::json::array();
     for (const std::string& camera : cameras) {
         o.camera = camera;
-        auto document = replay_camera(o);
+        auto document = replay_camera(o, mcap);
         if (!document) return document;
         passed = passed && document->value("passed", false);
         documents.push_back(*std::move(document));
     }
+    if (auto closed = mcap.close(); !closed) return closed.error();
     if (documents.size() == 1) return documents[0];
     return nlohmann::json{{"passed", passed}, {"log", o.folder}, {"cameras", documents}};
 }
@@ -183,7 +225,8 @@ Outcome replay(const ReplayOptions& o) {
     if (!o.picture.empty() && o.reference == 0)
         return Error{
             fmt::format("-o {} shows frames beside their reference, expected --reference SPP too", o.picture)};
-    if (auto made = make_folder_of_picture(o.picture); !made) return made.error();
+    for (const auto& make : {make_folder_of_picture(o.picture), make_folder_of(o.mcap)})
+        if (!make) return make.error();
     const LoggedSensors logged = sensors_in(o.folder);
     if (logged.cameras.empty() && logged.lidars)
         return Error{"has no log of a camera, NAME.ledger.csv, expected one: sweeps of LiDARs are not replayed",
@@ -220,9 +263,10 @@ Outcome replay_any(const ReplayOptions& o) {
         emulator.folder += "/emulator";
         return replay(emulator);
     }
+    if (auto made = make_folder_of(o.mcap); !made) return made.error();
     stop_on_signals();
     Progress progress("running " + o.folder + " again");
-    return rehearsal::rerun({o.folder, o.dynamics, o.navigation, o.threads, NARPA_VERSION, {}},
+    return rehearsal::rerun({o.folder, o.dynamics, o.navigation, o.threads, NARPA_VERSION, {}, o.mcap},
                             {say,
                              [&](double share, double left_s, std::string_view text) {
                                  progress.show({share, std::string(text), left_s});
@@ -253,6 +297,7 @@ Command add_replay(Parser app) {
                              name))
             .type_name("COMMAND");
     c.option("-o,--output", o->picture, "The worst frame, its reference, their difference").type_name("FILE.png");
+    add_mcap_to(c, o->mcap);
     c.footer(
         "Exit status 1 if a frame does not repeat bit for bit, or none has an image. RMSE, bias and errors are of "
         "the mean of the bands, as fractions of the radiance at full scale.");

@@ -13,6 +13,7 @@
 
 #include "apps/cli.h"
 #include "apps/device_options.h"
+#include "apps/outputs.h"
 #include "apps/scene_argument.h"
 #include "apps/scene_options.h"
 #include "base/ready.h"
@@ -160,6 +161,8 @@ Outcome run(const RunCommandOptions& options) {
     if (options.seed) scene->render.seed = *options.seed;
     if (auto made = make_folders(o.video, video_sink_kind); !made) return made.error();
     if (auto made = make_folders(o.lidar, packet_sink_kind); !made) return made.error();
+    if (auto kept = keep_inputs({o.mcap}, *scene, {}); !kept) return kept.error();
+    if (auto made = make_folder_of(o.mcap); !made) return made.error();
     auto emulator = Emulator::create(*std::move(scene), o);
     if (!emulator) return emulator.error();
 
@@ -217,6 +220,7 @@ Command add_run(Parser app) {
         c.option("--log", o->run.log_folder,
                  "Folder for run.json, truth, ledger, CAN log and contact sheet; replaces an earlier run in it")
             .type_name("DIR");
+    add_mcap_to(c, o->run.mcap);
     c.flag("--log-shots", o->run.log_shots,
            "Log every LiDAR shot too: time, exact range, body, incidence, velocity, and the reported values (about "
            "40 MB a second for 300,000 shots a second)")

@@ -196,6 +196,7 @@ private:
             for (const std::string& camera : scenario_.navigation.cameras)
                 append(line, "--video", {camera + "=" + in_folder("emulator/" + camera + ".y4m")});
         append(line, "--lidar", lidar_sinks_);
+        if (!options_.mcap.empty()) append(line, "--mcap", {options_.mcap});
         if (!options_.real_time) line.emplace_back("--lockstep");
         if (options_.threads > 0) append(line, "--threads", {std::to_string(options_.threads)});
         emulator_.command.ready = Ready::option;

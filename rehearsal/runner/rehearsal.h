@@ -30,6 +30,7 @@ struct RehearsalOptions {
     double patience_s = 120;                   ///< wall time without progress
     bool page = true;                          ///< writes index.html
     bool keep_frames = false;  ///< writes the frames that the navigation gets as emulator/CAMERA.y4m
+    std::string mcap{};        ///< MCAP file of the emulator's run; empty: none
     bool lean = false;         ///< of a run that passes keeps only kLeanFiles
     std::string programs;      ///< folder of narpa, narpa-dynamics, narpa-navigation; empty: ours
     std::string version;

@@ -193,6 +193,7 @@ Result<json> rerun(const RerunOptions& options, const Console& console, const St
     o.page = false;
     o.version = options.version;
     o.programs = options.programs;
+    o.mcap = options.mcap;
     const auto done = run_rehearsal(o, console, stop);
     if (!done) return done.error();
     if (!done->written) return done->written.error();

@@ -32,6 +32,7 @@ struct RerunOptions {
     int threads = 0;
     std::string version;
     std::string programs;  ///< as in RehearsalOptions
+    std::string mcap{};    ///< as in RehearsalOptions
 };
 /// Runs it with the same seed into a temporary folder and compares the bus, ledgers, truths and the logs of
 /// navigation and dynamics. For runs in lockstep. A command that the record names is never run: it is an Error

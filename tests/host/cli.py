@@ -16,10 +16,10 @@ from support import expect, narpa
 
 SUBCOMMANDS = {
     "check": ["SCENE", "--set", "--strict"],
-    "run": ["--can", "--video", "--lidar", "--lockstep", "--duration", "--log", "--spp", "--budget-ms", "--budget-rays"],
+    "run": ["--can", "--video", "--lidar", "--lockstep", "--duration", "--log", "--mcap", "--spp", "--budget-ms", "--budget-rays"],
     "fly": ["--can", "--lockstep"],
     "render": ["--camera", "--time", "--frame", "--trajectory", "--pose", "--format", "-o", "--set", "--strict", "--every"],
-    "rehearse": ["SCENARIO", "--set", "--strict"],
+    "rehearse": ["SCENARIO", "--set", "--strict", "--mcap"],
     "map": ["--camera", "--of", "--body", "--interval", "--datum", "--up", "--time", "--pose", "-o"],
     "scan": ["--lidar", "--time", "--trajectory", "-o"],
     "estimate": ["--frame", "--sweep", "--no-truth", "--uncertainty", "--frame-noise", "--method", "--start"],

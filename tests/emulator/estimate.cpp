@@ -1,6 +1,7 @@
 // Poses estimated beside a run and from its log: what is logged, what goes out on CAN, what the program prints.
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,8 @@
 #include "renderer/camera/scene_camera.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
+#include "tests/protocols/mcap_reader.h"
+#include "tests/protocols/protobuf_reader.h"
 #include "tests/support/cameras.h"
 #include "tests/support/command.h"
 #include "tests/support/paths.h"
@@ -63,6 +66,7 @@ protected:
         o.bus = approach(commands);
         o.lockstep = true;
         o.log_folder = log;
+        o.mcap = mcap_;
         o.video = {{"nav", "none"}};
         TrackerOptions options;
         options.start_deg = options.start_percent = 3;
@@ -70,7 +74,40 @@ protected:
         return ran(docking(), o);
     }
     const OnlineEstimator* estimator_ = nullptr;
+    std::string mcap_;
 };
+
+TEST_F(EstimateTest, TheMcapFileHasPosesAndCovariances) {
+    mcap_ = folder_ / "a.mcap";
+    const auto emulator = fly(3, "");
+    ASSERT_NE(emulator, nullptr);
+    const McapFileRead file = read_mcap(read_bytes(mcap_));
+    const auto& frames = estimator_->frames();
+    ASSERT_EQ(file.count("/camera/nav/estimate"), frames.size());
+    EXPECT_EQ(file.count("/camera/nav/estimate/pose"), frames.size());
+    const auto number = [](const ProtoFields& fields, int field) {
+        const auto found = fields.find(field);
+        return found == fields.end() ? 0 : std::bit_cast<double>(found->second.number);
+    };
+    std::size_t k = 0;
+    for (const McapMessageRead& m : file.messages) {
+        if (m.topic != "/camera/nav/estimate") continue;
+        const TrackedFrame& f = frames[k++];
+        EXPECT_EQ(m.log_ns, static_cast<std::uint64_t>(f.t_ns));
+        const ProtoFields fields = read_proto(m.data);
+        EXPECT_EQ(text_of(fields.find(2)->second), "camera/nav");
+        EXPECT_EQ(text_of(fields.find(5)->second), "measured");
+        const ProtoFields pose = read_proto(fields.find(7)->second.bytes);
+        const ProtoFields position = read_proto(pose.find(1)->second.bytes);
+        EXPECT_EQ(number(position, 3), f.filtered.t.z);
+        EXPECT_EQ(number(read_proto(pose.find(2)->second.bytes), 4), f.filtered.q.w);
+        const auto& covariance = fields.find(8)->second.bytes;
+        ASSERT_EQ(covariance.size(), 36 * sizeof(double));
+        for (std::size_t i = 0; i < 36; ++i)
+            EXPECT_EQ(std::bit_cast<double>(get_le<std::uint64_t>(covariance.data() + 8 * i)),
+                      f.filtered_covariance(static_cast<int>(i / 6), static_cast<int>(i % 6)));
+    }
+}
 
 TEST_F(EstimateTest, EveryFrameOfALockstepRunIsLookedAt) {
     const std::string log = folder_ / "log";

@@ -36,6 +36,8 @@ lockstep.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3, python3-numpy, narpa (= ${PROJECT_VERSION})")
 
+set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_LIST_DIR}/debian/prerm)
+
 foreach(entry narpa=narpa dev=narpa-dev python=python3-narpa)
   string(REPLACE "=" ";" entry ${entry})
   list(GET entry 0 component)

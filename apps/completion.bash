@@ -12,7 +12,7 @@ _narpa() {
         return
     fi
     if [ "$COMP_CWORD" -eq 2 ]; then
-        words=$("$program" list 2>/dev/null | sed -n 's/^  \([a-z][a-z-]*\)  .*/\1/p')
+        words=$("$program" list 2>&1 | sed -n 's/^  \([a-z][a-z-]*\)  .*/\1/p')
         mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
     fi
     mapfile -O "${#COMPREPLY[@]}" -t COMPREPLY < <(compgen -f -- "$word")

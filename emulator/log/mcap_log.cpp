@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "emulator/log/ledger_log.h"
+#include "emulator/log/zstd_frame.h"
 #include "protocols/foxglove/ledger_message.h"
 
 namespace narpa {
@@ -127,9 +128,11 @@ McapLog::McapLog(std::string path, std::FILE* file, const Scene& scene, bool loc
       cameras_(scene.cameras.size()),
       lidars_(scene.lidars.size()),
       placed_(scene.bodies.size()) {
-    writer_ = std::make_unique<McapWriter>([this](McapWriter::Bytes bytes) {
-        if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size() && reason_ == 0) reason_ = errno;
-    });
+    writer_ = std::make_unique<McapWriter>(
+        [this](McapWriter::Bytes bytes) {
+            if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size() && reason_ == 0) reason_ = errno;
+        },
+        McapOptions{.zstd = zstd_frames(1)});
     writer_->add_metadata("narpa", {{"scene", scene.name},
                                     {"clock", "simulation time, ns"},
                                     {"epoch_unix_ns", std::to_string(scene.epoch_unix_ns)},

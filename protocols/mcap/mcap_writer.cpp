@@ -1,7 +1,5 @@
 #include "protocols/mcap/mcap_writer.h"
 
-#include <zstd.h>
-
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -79,8 +77,7 @@ void McapWriter::TimeSpan::add(std::uint64_t t_ns) noexcept {
 }
 
 McapWriter::McapWriter(std::function<void(Bytes)> write, const McapOptions& options)
-    : write_(std::move(write)), options_(options), compressor_(nullptr, ZSTD_freeCCtx) {
-    if (options_.level > 0) compressor_.reset(ZSTD_createCCtx());
+    : write_(std::move(write)), options_(options) {
     {
         McapRecord record(record_, McapOpcode::header);
         record.put("");  // profile
@@ -173,12 +170,9 @@ void McapWriter::end_chunk() {
     if (chunk_.empty()) return;
     Bytes content = chunk_;
     std::string_view compression;
-    if (compressor_) {
-        compressed_.resize(ZSTD_compressBound(chunk_.size()));
-        const std::size_t size = ZSTD_compressCCtx(compressor_.get(), compressed_.data(), compressed_.size(),
-                                                   chunk_.data(), chunk_.size(), options_.level);
-        assert(!ZSTD_isError(size) && "the buffer is as large as the bound");
-        content = Bytes(compressed_).first(size);
+    if (options_.zstd) {
+        options_.zstd(chunk_, compressed_);
+        content = compressed_;
         compression = "zstd";
     }
     record_.clear();

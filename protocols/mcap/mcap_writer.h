@@ -7,20 +7,19 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-struct ZSTD_CCtx_s;
-
 namespace narpa {
 
 struct McapOptions {
     std::size_t chunk_bytes = 4 << 20;  ///< of messages before compression, about
-    int level = 1;                      ///< of zstd; 0: chunks are not compressed
-    std::string library = "narpa";      ///< who wrote the file
+    /// Replaces `to` by a zstd frame of `from`; empty: chunks are not compressed. So that this folder needs no
+    /// library.
+    std::function<void(std::span<const std::uint8_t> from, std::vector<std::uint8_t>& to)> zstd{};
+    std::string library = "narpa";  ///< who wrote the file
 };
 
 class McapWriter {
@@ -68,7 +67,6 @@ private:
 
     std::function<void(Bytes)> write_;
     McapOptions options_;
-    std::unique_ptr<ZSTD_CCtx_s, std::size_t (*)(ZSTD_CCtx_s*)> compressor_;
     std::uint64_t position_ = 0, messages_ = 0;
     std::uint32_t crc_ = 0;  ///< of all bytes since the last time it was 0
     std::uint32_t schemas_ = 0, metadata_ = 0, chunks_ = 0;

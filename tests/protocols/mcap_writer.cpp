@@ -18,9 +18,14 @@ struct Written {
     }
 };
 
+void zstd(std::span<const std::uint8_t> from, FileBytes& to) {
+    to.resize(ZSTD_compressBound(from.size()));
+    to.resize(ZSTD_compress(to.data(), to.size(), from.data(), from.size(), 1));
+}
+
 TEST(McapWriter, AnEmptyFileHasMagicHeaderEndStatisticsAndFooter) {
     Written file;
-    McapWriter writer(file.sink(), {.level = 0, .library = "x"});
+    McapWriter writer(file.sink(), {.library = "x"});
     writer.finish();
     const FileBytes begin{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n',     // magic
                           0x01, 9,   0,   0,   0,   0,   0,    0,    0,  // header of 4 + 0 + 4 + 1 bytes
@@ -32,9 +37,9 @@ TEST(McapWriter, AnEmptyFileHasMagicHeaderEndStatisticsAndFooter) {
 }
 
 TEST(McapWriter, WhatIsWrittenIsReadBackAsAStreamAndByIndex) {
-    for (const int level : {0, 1}) {
+    for (const bool compresses : {false, true}) {
         Written file;
-        McapWriter writer(file.sink(), {.chunk_bytes = 1000, .level = level});
+        McapWriter writer(file.sink(), {.chunk_bytes = 1000, .zstd = compresses ? zstd : nullptr});
         writer.add_metadata("run", {{"scene", "docking"}, {"seed", "7"}});
         const FileBytes schema{1, 2, 3};
         const auto a = writer.add_channel("/a", writer.add_schema("p.A", schema));

@@ -81,7 +81,7 @@ def calibration():
 def batch():
     states = [{"t_s": 0.5 * k, "rotation_error_rad": 1e-3 * random.lognormal(-1), "position_error_m": 0.01 * random.lognormal(-1),
                "rotation_sigma_rad": 1e-3, "position_sigma_m": 0.01} for k in range(40)]  # fmt: skip
-    residuals = [{"t_s": 0.5 * k, "sweep": k % 2 == 1, "start": 0.3, "end": 0.1} for k in range(40)]
+    residuals = [{"t_s": 0.5 * k, "measure": ("camera", "lidar", "brightness")[k % 3], "start": 0.3, "end": 0.1} for k in range(40)]
     unknowns = [{"name": name, "change": 0.8, "sigma": 0.1 if known else 0.95, "prior_sigma": 1, "truth": 0.9, "determined": known}
                 for name, known in (("focal", True), ("scale", False), ("clock_s", True))]  # fmt: skip
     return {"states": states, "residuals": residuals, "unknowns": unknowns}

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "estimator/batch/camera_change.h"
+
 namespace narpa {
 namespace {
 
@@ -65,36 +67,45 @@ void BatchFrameFeed::take(const FrameLedger& ledger, std::span<const std::uint8_
     tracked_.push_back(std::move(f));
 }
 
-BrightnessObservations BatchFrameFeed::brightness(const World& corrected, const Kept& frame,
-                                                  const Rigid3& T_camera_target,
-                                                  const std::array<double, 2>& light_rad) const {
-    const Camera& in_the_scene = corrected.scene().cameras[camera_];
-    Camera camera = in_the_scene;
-    if (!set_to_frame(frame.ledger, in_the_scene, camera)) return {};
-    const auto image = measured_image(camera, frame.bytes);
-    if (!image) return {};
-    const RenderSettings& render = corrected.scene().render;
-    FrameSettings settings;
-    settings.spp = tracker_->options().spp, settings.seed = ~tracker_->options().seed;
-    settings.frame = frame.ledger.frame;  // errors of samples that frames have in common would not average out
-    settings.method = render.method, settings.max_depth = render.max_depth;
-    return narpa::observe_brightness(corrected.render_scene(), camera, tracker_->target(), frame.at, *image,
-                                     T_camera_target, settings, light_rad);
+/// A distortion before that of a projection without OpenCV's cannot be rendered, and is left out.
+std::shared_ptr<const CameraModel> BatchFrameFeed::corrected(const CameraModel& model, BatchValues change) {
+    auto changed = changed_camera(model, change);
+    if (changed) return *std::move(changed);
+    for (const BatchUnknown u :
+         {BatchUnknown::k1, BatchUnknown::k2, BatchUnknown::p1, BatchUnknown::p2, BatchUnknown::k3})
+        at(change, u) = 0;
+    changed = changed_camera(model, change);
+    return changed ? *std::move(changed) : nullptr;
 }
 
-void BatchFrameFeed::observe_brightness(const World& corrected, const BatchResult& found, BatchInput& input) const {
-    const Camera& c = corrected.scene().cameras[camera_];
-    const Rigid3 T_chaser_camera = c.mount < 0 ? Rigid3{} : c.T_mount_camera;
-    std::array<double, 2> light_rad{};
-    for (const BatchEstimate& e : found.unknowns)
-        if (e.unknown == BatchUnknown::light_x || e.unknown == BatchUnknown::light_y)
-            light_rad[e.unknown == BatchUnknown::light_y] = e.value;
+void BatchFrameFeed::observe_brightness(const BatchResult& found, BatchInput& input) const {
+    BatchValues change{};
+    for (const BatchEstimate& e : found.unknowns) at(change, e.unknown) = e.value;
+    const Camera& in_the_scene = model_.scene().cameras[camera_];
+    const auto lens = corrected(*in_the_scene.model, change);
+    if (!lens) return;
+    Rigid3 T_chaser_camera = input.T_chaser_camera;
+    T_chaser_camera.q = normalized(T_chaser_camera.q * exp_rotation(vector_at(change, BatchUnknown::camera_rx)));
+    T_chaser_camera.t = T_chaser_camera.t + vector_at(change, BatchUnknown::camera_x);
+    const RenderSettings& render = model_.scene().render;
+    FrameSettings settings;
+    settings.spp = tracker_->options().spp, settings.seed = ~tracker_->options().seed;
+    settings.method = render.method, settings.max_depth = render.max_depth;
     for (std::size_t i = 0; i < kept_.size(); ++i) {
         BatchFrame& frame = input.frames[i];
+        Camera camera = in_the_scene;
+        if (!set_to_frame(kept_[i].ledger, in_the_scene, camera)) continue;
+        const auto image = measured_image(camera, kept_[i].bytes);
+        if (!image) continue;
+        camera.model = lens;
         auto state = std::ranges::upper_bound(found.states, frame.time.t_ns, {}, &BatchState::t_ns);
         if (state != found.states.begin()) --state;
-        frame.brightness =
-            brightness(corrected, kept_[i], inverse(T_chaser_camera) * state->T_chaser_target, light_rad);
+        Rigid3 T = inverse(T_chaser_camera) * state->T_chaser_target;
+        T.t = T.t / (1 + at(change, BatchUnknown::scale));  // a larger target looks the same as much further away
+        settings.frame = kept_[i].ledger.frame;  // errors of samples that frames share would not average out
+        frame.brightness = narpa::observe_brightness(
+            model_.render_scene(), camera, tracker_->target(), kept_[i].at, *image, T, settings,
+            {at(change, BatchUnknown::light_x), at(change, BatchUnknown::light_y)});
     }
 }
 

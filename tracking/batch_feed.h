@@ -48,10 +48,10 @@ public:
     [[nodiscard]] const std::vector<TrackedFrame>& tracked() const noexcept { return tracked_; }
     [[nodiscard]] std::size_t target() const noexcept { return tracker_->target(); }
     void finish(BatchInput& input);
-    /// After finish(): compares the brightness of the frames with `corrected`, the model without the errors that
-    /// `found`, a solution without their brightness or with one of an earlier light, has found, at its poses. With
-    /// the model as it is, frame and render would be pixels apart.
-    void observe_brightness(const World& corrected, const BatchResult& found, BatchInput& input) const;
+    /// After finish(): compares the brightness of the frames with the model's, with the camera and at the poses
+    /// that `found`, a solution without their brightness or with one of an earlier light, has found. With the model
+    /// as it is, frame and render would be pixels apart.
+    void observe_brightness(const BatchResult& found, BatchInput& input) const;
 
 private:
     /// A frame that entered the batch.
@@ -62,9 +62,8 @@ private:
     };
     BatchFrameFeed(const World& model, std::size_t camera, std::unique_ptr<FrameTracker> tracker, bool keeps_frames)
         : model_(model), camera_(camera), keeps_frames_(keeps_frames), tracker_(std::move(tracker)) {}
-    [[nodiscard]] BrightnessObservations brightness(const World& corrected, const Kept& frame,
-                                                    const Rigid3& T_camera_target,
-                                                    const std::array<double, 2>& light_rad) const;
+    /// Null: no projection has these changes.
+    [[nodiscard]] static std::shared_ptr<const CameraModel> corrected(const CameraModel& model, BatchValues change);
 
     const World& model_;
     std::size_t camera_;

@@ -179,20 +179,13 @@ Status track_sweeps(const BatchPlan& plan, SweepSource& source) {
 
 /// Solves for what the frames' points tell, then compares brightness with the model corrected by it: twice, as
 /// brightness is not linear in the light's direction.
-Status observe_brightness(const BatchPlan& plan, const FrameSource& source, BatchInput& input) {
-    BatchOptions options = plan.options;
+Status observe_brightness(const BatchOptions& all, const BatchFrameFeed& frames, BatchInput& input) {
+    BatchOptions options = all;
     for (const BatchUnknown u : kBrightnessUnknowns) at(options.prior_sigma, u) = 0;
-    for (int k = 0; k < 2; ++k, options = plan.options) {
+    for (int k = 0; k < 2; ++k, options = all) {
         const auto found = solve_batch(input, options);
         if (!found) return found.error();
-        BatchValues geometry{};
-        for (const BatchEstimate& e : found->unknowns) at(geometry, e.unknown) = e.value;
-        for (const BatchUnknown u : kBrightnessUnknowns) at(geometry, u) = 0;
-        Scene scene = (source.model ? *source.model : source.run->world()).scene();
-        if (auto good = apply_model_errors(geometry, source.feed->target(), scene); !good) return good.error();
-        const auto corrected = World::create(std::move(scene));
-        if (!corrected) return corrected.error();
-        source.feed->observe_brightness(**corrected, *found, input);
+        frames.observe_brightness(*found, input);
     }
     return Ok{};
 }
@@ -240,7 +233,7 @@ Outcome estimate_batch(const RunEstimate& run, const BatchSensors& sensors, cons
     if (frames.feed) frames.feed->finish(input);
     if (sweeps.feed) sweeps.feed->finish(input);
     if (frames.feed && plan->observes_brightness())
-        if (auto observed = observe_brightness(*plan, frames, input); !observed)
+        if (auto observed = observe_brightness(plan->options, *frames.feed, input); !observed)
             return Error{observed.error().what, run.folder, 0, 0, observed.error().kind};
     BatchTruth truth = truth_of(input, plan->error);
     if (frames.feed) truth.alone.push_back(summarise(frames.feed->tracked()));

@@ -101,11 +101,11 @@ private:
     std::jthread watch_;
 };
 
-/// Tells the service manager's watchdog that the run's clock moves, twice as often as it asks for. A run in
-/// lockstep may wait for commands, so its watchdog is fed as long as the program answers at all.
-class Heartbeat {
+/// Tells the service manager's watchdog, twice as often as it asks for, that the run's clock has moved within its
+/// time. A run in lockstep may wait for commands, so it counts as moving.
+class WatchdogFeed {
 public:
-    Heartbeat(const Emulator& emulator, const ServiceManager& manager) {
+    WatchdogFeed(const Emulator& emulator, const ServiceManager& manager) {
         if (!manager.watchdog_ns()) return;
         const std::chrono::nanoseconds pause(*manager.watchdog_ns() / 2);
         beats_ = std::jthread([&emulator, &manager, pause](const std::stop_token& stop) {
@@ -178,7 +178,7 @@ Outcome run(const RunCommandOptions& options) {
     bool gave_up = false;
     const Status status = [&] {
         const Patience patience(**emulator, options.patience_s);
-        const Heartbeat heartbeat(**emulator, *manager);
+        const WatchdogFeed watchdog(**emulator, *manager);
         const Progress progress("running", [&] { return step_of(**emulator); });
         const Status ran = (*emulator)->run(stop_flag());
         gave_up = patience.is_over();

@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"
@@ -19,8 +20,9 @@ using nlohmann::json;
 class EstimateBatch : public LoopTest {
 protected:
     /// Twelve seconds of the docking approach in lockstep, 30 frames.
-    void fly() {
-        const std::array<std::string, 2> changes{"camera.nav.rate_hz=2.5", "render.spp=4"};
+    void fly(const std::vector<std::string>& further = {}) {
+        std::vector<std::string> changes{"camera.nav.rate_hz=2.5", "render.spp=4"};
+        changes.insert(changes.end(), further.begin(), further.end());
         auto scene = read_scene(test::build_path("scenes/docking/docking.toml"), changes);
         ASSERT_TRUE(scene) << scene.error().text();
         RunOptions o;
@@ -47,6 +49,16 @@ protected:
     }
     const std::string log_ = folder_ / "log";
 };
+
+/// Its distortion cannot be changed in a render, its brightness is compared nevertheless.
+TEST_F(EstimateBatch, FindsTheAlbedoWithAFisheye) {
+    fly({R"(camera.nav.distortion={model = "fisheye", coefficients = [0.02, 0.0, 0.0, 0.0]})"});
+    const json found = told("--camera nav --every 5 --model-error albedo=0.1");
+    const json albedo = unknown(found, "albedo");
+    EXPECT_TRUE(albedo["determined"]);
+    EXPECT_NEAR(albedo["change"].get<double>(), 1 / 1.1 - 1, 0.01);
+    EXPECT_LT(albedo["error_of_sigma"].get<double>(), 4.5);
+}
 
 TEST_F(EstimateBatch, FindsErrorsThatArePutIntoTheModel) {
     fly();

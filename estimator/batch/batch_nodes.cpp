@@ -31,7 +31,7 @@ void set_rates(std::vector<BatchNode>& nodes) {
 
 }  // namespace
 
-std::vector<BatchObservation> observations_of(const BatchInput& input) {
+std::vector<BatchObservation> observations_of(const BatchInput& input, bool are_states_when_measured) {
     std::vector<BatchObservation> all;
     const auto add = [&](const BatchTime& time, BatchMeasure measure, const Rigid3& T,
                          std::unique_ptr<Measurement> measurement) {
@@ -41,7 +41,8 @@ std::vector<BatchObservation> observations_of(const BatchInput& input) {
                           time.chaser_rate_rad_s,
                           is_sweep ? BatchUnknown::lidar_rx : BatchUnknown::camera_rx,
                           is_sweep ? BatchUnknown::lidar_x : BatchUnknown::camera_x,
-                          is_sweep || input.sweeps.empty()};
+                          is_sweep || input.sweeps.empty(),
+                          are_states_when_measured};
         all.push_back({&time, measure, all.size(), T, place, std::move(measurement)});
     };
     for (const BatchFrame& f : input.frames)

@@ -24,8 +24,8 @@ struct BatchNode {
     RelativeState state{};
 };
 
-/// All frames and sweeps, in order of time.
-[[nodiscard]] std::vector<BatchObservation> observations_of(const BatchInput& input);
+/// All frames and sweeps, in order of time. `are_states_when_measured`: SensorPlace::is_state_when_measured of all.
+[[nodiscard]] std::vector<BatchObservation> observations_of(const BatchInput& input, bool are_states_when_measured);
 /// A node for each time, with the observations' poses; velocities and rates from those of their neighbours. Sets
 /// the observations' nodes.
 [[nodiscard]] std::vector<BatchNode> nodes_of(std::vector<BatchObservation>& observations);

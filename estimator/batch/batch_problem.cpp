@@ -17,7 +17,8 @@ constexpr double kWrong = 5;
 BatchProblem::BatchProblem(const BatchInput& input, const BatchOptions& options, const BatchValues& prior_sigma)
     : options_(options),
       shared_(prior_sigma),
-      observations_(observations_of(input)),
+      are_states_when_measured_(!options.path && (input.frames.empty() || input.sweeps.empty())),
+      observations_(observations_of(input, are_states_when_measured_)),
       nodes_(nodes_of(observations_)),
       scores_(observations_.size()),
       states_(nodes_.size()),

@@ -23,6 +23,10 @@ public:
     [[nodiscard]] const BatchNode& node(std::size_t k) const noexcept { return nodes_[k]; }
     /// In units of the model (sensor_geometry.h).
     [[nodiscard]] RelativeState state(std::size_t k) const { return unpack(states_[k].data()); }
+    /// States are those at the true times of the measurements, not at their stamps: of one sensor on a path of
+    /// which nothing is known. Were they shifted by the clock, velocities would take up noise of the positions by
+    /// it, and the clock moved by 8 standard deviations of its prior.
+    [[nodiscard]] bool are_states_when_measured() const noexcept { return are_states_when_measured_; }
     [[nodiscard]] const double* state_block(std::size_t k) const noexcept { return states_[k].data(); }
     [[nodiscard]] const SharedBlock& shared() const noexcept { return shared_; }
     [[nodiscard]] const double* shared_block() const noexcept { return values_.data(); }
@@ -49,6 +53,7 @@ private:
 
     const BatchOptions& options_;
     SharedBlock shared_;
+    bool are_states_when_measured_;
     std::vector<BatchObservation> observations_;
     std::vector<BatchNode> nodes_;
     std::vector<Score> scores_;      ///< of each observation

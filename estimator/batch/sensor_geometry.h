@@ -16,6 +16,8 @@ struct SensorPlace {
     BatchUnknown mount_rotation = BatchUnknown::camera_rx,
                  mount_shift = BatchUnknown::camera_x;  ///< first of three
     bool has_clock = false;                             ///< BatchUnknown::clock is that of this sensor
+    /// The state is that at the true time of the measurement, not at the time of its stamp.
+    bool is_state_when_measured = false;
 };
 
 /// T_sensor_target and its derivatives: errors of the pose (pose_estimate.h) by those of the state

@@ -88,6 +88,10 @@ TEST_F(EstimateBatch, FindsErrorsThatArePutIntoTheModel) {
     const json camera = told("--method marks --camera nav");
     for (const char* name : {"scale", "clock_s"}) EXPECT_FALSE(unknown(camera, name)["determined"]) << name;
     EXPECT_EQ(unknown(camera, "focal")["truth"], 0);
+    // Nor does noise of positions move the clock: the chaser's attitude, which could tell it, hardly changes.
+    const json lidar = told("--lidar top --unknowns clock_s --model-error clock_s=0.1");
+    EXPECT_NEAR(unknown(lidar, "clock_s")["change"].get<double>(), 0, 0.01);
+    EXPECT_LT(lidar["nees_mean"].get<double>(), 12);
     EXPECT_GE(camera["not_determined"].size(), 2u);
 
     const auto refuses = [&](const std::string& options, const std::string& words) {

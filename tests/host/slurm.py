@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Data sets and campaigns on a Slurm of two nodes, one of which is lost: the same bytes as on this machine, and nothing made twice.
 
-Usage: slurm.py dataset | rehearse"""
+Usage: slurm.py dataset | rehearse
+With NARPA_CAMPAIGN in the environment: 10,000 images of 256 x 256, 200 runs."""
 import filecmp
 import json
 import os
@@ -15,7 +16,10 @@ import slurm_nodes
 import support
 from support import NARPA, expect, narpa
 
-IMAGES, SHARDS, RUNS = 24, 4, 3
+IS_CAMPAIGN = "NARPA_CAMPAIGN" in os.environ
+IMAGES, SHARDS, RUNS = (10000, 8, 200) if IS_CAMPAIGN else (24, 4, 3)
+IMAGE = ["render.spp=1", "camera.nav.resolution=[256, 256]"] if IS_CAMPAIGN else ["render.spp=400"]
+WAIT_S = 7200 if IS_CAMPAIGN else 600
 SCENARIO = Path(os.environ["NARPA_BUILD_DIR"]) / "scenes/rehearsal/dispersions.toml"
 
 
@@ -71,7 +75,7 @@ def lose_node_in_the_middle(cluster, shared):
 def dataset():
     folder = support.work_folder()
     recipe, local, shared = folder / "recipe.toml", folder / "local", folder / "shared 50%"
-    recipe.write_text(f'[dataset]\nname = "bench"\nscene = "{support.SCENE}"\ncamera = "nav"\ntarget = "bay"\nset = ["render.spp=400"]\n')
+    recipe.write_text(f'[dataset]\nname = "bench"\nscene = "{support.SCENE}"\ncamera = "nav"\ntarget = "bay"\nset = {json.dumps(IMAGE)}\n')
     command = ["dataset", recipe, "-n", IMAGES]
     check_no_sbatch(*command, "-o", shared)
     slurm_nodes.check_installed()
@@ -83,7 +87,7 @@ def dataset():
         task, there = lose_node_in_the_middle(cluster, shared)
         narpa(*on, status=1)  # the jobs are in the queue still
         release(cluster)
-        said = json.loads(waiting.communicate(timeout=600)[0])
+        said = json.loads(waiting.communicate(timeout=WAIT_S)[0])
         expect(waiting.returncode == 0 and said["made"] == IMAGES and said["gathered"], f"the data set is complete: {said}")
         expect(not cluster.output("squeue", "-h"), "no job is left")
         log = (shared / f"slurm/part-{task}.log").read_text()
@@ -127,7 +131,7 @@ def rehearse():
         task = task_on(cluster, "n2")
         expect(cluster.lose_node("n2") > 0, f"node n2 is lost while it flies runs of task {task}")
         release(cluster)
-        said = json.loads(waiting.communicate(timeout=600)[0])
+        said = json.loads(waiting.communicate(timeout=WAIT_S)[0])
         expect(waiting.returncode == 1 and said == summary, "the same summary as on this machine, and the same exit status")
         results = ["dynamics/truth.csv", "dynamics/dynamics.json", "navigation/navigation.csv", "emulator/can.log", "scenario.toml"]
         same = [f"runs/{k:04}/{name}" for k in range(1, RUNS + 1) for name in results] + ["summary.json", "junit.xml"]

@@ -15,6 +15,7 @@
 #include "renderer/geometry/flush_denormals.h"
 #include "renderer/integrator/shading.h"
 #include "renderer/optics/image_optics.h"
+#include "renderer/projection/tabulated_model.h"
 
 namespace narpa {
 namespace {
@@ -117,11 +118,16 @@ private:
     const BodyPoses& at_;
 };
 
+Camera with_tabulated_rays(Camera camera) {
+    camera.model = tabulated(std::move(camera.model), camera.width, camera.height);
+    return camera;
+}
+
 }  // namespace
 
 struct CameraRenderer::Impl {
     const RenderScene& render_scene;
-    const Camera& camera;
+    Camera camera;  ///< with tabulated rays
     bool with_stars;
     FramePasses passes{render_scene.tracer(), camera};
     PassCosts costs{};
@@ -171,7 +177,7 @@ struct CameraRenderer::Impl {
 };
 
 CameraRenderer::CameraRenderer(const RenderScene& render_scene, const Camera& camera, bool with_stars)
-    : impl_(new Impl{render_scene, camera, with_stars}) {}
+    : impl_(new Impl{render_scene, with_tabulated_rays(camera), with_stars}) {}
 CameraRenderer::~CameraRenderer() = default;
 
 FrameAccount CameraRenderer::render(const BodyPoses& at, const CameraPose& pose, const FrameSettings& settings,

@@ -46,7 +46,7 @@ void render_radiance(const RenderScene& render_scene, const BodyPoses& at, const
 /// between.
 class CameraRenderer {
 public:
-    /// Both arguments outlive it. `with_stars`: renders the scene's stars, if it has any.
+    /// `render_scene` outlives it. `with_stars`: renders the scene's stars, if it has any.
     CameraRenderer(const RenderScene& render_scene, const Camera& camera, bool with_stars = true);
     ~CameraRenderer();
 

@@ -11,7 +11,10 @@ class CalibratedModel : public CameraModel {
 public:
     [[nodiscard]] double pixels_per_radian() const noexcept override { return pinhole_.fx; }
     [[nodiscard]] DirectionCone bounds(const ImageRect& rect) const noexcept override {
-        return cone_about_border(*this, rect);
+        const RectBorder points = border_of(rect);
+        Vec3Lanes border;
+        directions({}, points.x, points.y, border);
+        return cone_about_border(direction(middle(rect)), border);
     }
     [[nodiscard]] std::shared_ptr<const CameraModel> scaled(double x, double y) const override {
         return kind_->make(pinhole_.with_scale(x, y), values_);

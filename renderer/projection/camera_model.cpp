@@ -28,24 +28,24 @@ ProjectionParameters CameraModel::parameters() const {
     return {.kind = nullptr, .pinhole = {kNaN, kNaN, kNaN, kNaN}};
 }
 
-/// From sixteen points of the border. Between two of them the border deviates from the nearer one by half their
-/// distance, and a little more where it is curved. The interior lies within, because the projection does not fold
-/// where the camera sees.
-DirectionCone cone_about_border(const CameraModel& model, const ImageRect& r) noexcept {
-    constexpr double kStray = 0.6;
+RectBorder border_of(const ImageRect& r) noexcept {
     constexpr std::size_t kPerEdge = kLanes / 4;
-    Lanes<double> x, y;
+    RectBorder p;
     for (std::size_t i = 0; i < kPerEdge; ++i) {
         const double part = static_cast<double>(i) / kPerEdge;
         const double along_x = part * (r.x_high - r.x_low), along_y = part * (r.y_high - r.y_low);
-        x[i] = r.x_low + along_x, y[i] = r.y_low;
-        x[kPerEdge + i] = r.x_high, y[kPerEdge + i] = r.y_low + along_y;
-        x[2 * kPerEdge + i] = r.x_high - along_x, y[2 * kPerEdge + i] = r.y_high;
-        x[3 * kPerEdge + i] = r.x_low, y[3 * kPerEdge + i] = r.y_high - along_y;
+        p.x[i] = r.x_low + along_x, p.y[i] = r.y_low;
+        p.x[kPerEdge + i] = r.x_high, p.y[kPerEdge + i] = r.y_low + along_y;
+        p.x[2 * kPerEdge + i] = r.x_high - along_x, p.y[2 * kPerEdge + i] = r.y_high;
+        p.x[3 * kPerEdge + i] = r.x_low, p.y[3 * kPerEdge + i] = r.y_high - along_y;
     }
-    Vec3Lanes border;
-    model.directions({}, x, y, border);
-    const Vec3 axis = model.direction({0.5 * (r.x_low + r.x_high), 0.5 * (r.y_low + r.y_high)});
+    return p;
+}
+
+/// Between two of the points the border deviates from the nearer one by half their distance, and a little more
+/// where it is curved. The interior lies within, because the projection does not fold where the camera sees.
+DirectionCone cone_about_border(const Vec3& axis, const Vec3Lanes& border) noexcept {
+    constexpr double kStray = 0.6;
     const auto chord_squared = [](const Vec3& a, const Vec3& b) { return dot(a - b, a - b); };
     double farthest = 0, widest = 0;
     for (std::size_t i = 0; i < kLanes; ++i) {

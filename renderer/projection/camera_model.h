@@ -27,6 +27,10 @@ struct ImageRect {
     double x_low = 0, y_low = 0, x_high = 0, y_high = 0;
 };
 
+[[nodiscard]] inline ImagePoint middle(const ImageRect& r) noexcept {
+    return {0.5 * (r.x_low + r.x_high), 0.5 * (r.y_low + r.y_high)};
+}
+
 /// All directions within an angle of its axis, camera axes.
 struct DirectionCone {
     Vec3 axis{0, 0, 1};  ///< unit
@@ -90,7 +94,12 @@ public:
     [[nodiscard]] virtual const Pinhole* pinhole() const noexcept { return nullptr; }
 };
 
-/// `bounds` of a model without a closed form: from directions along the border.
-[[nodiscard]] DirectionCone cone_about_border(const CameraModel& model, const ImageRect& rect) noexcept;
+/// `bounds` of a model without a closed form, from directions through points of the border.
+struct RectBorder {
+    Lanes<double> x, y;
+};
+[[nodiscard]] RectBorder border_of(const ImageRect& rect) noexcept;
+/// `axis`: direction through the middle; `border`: through border_of().
+[[nodiscard]] DirectionCone cone_about_border(const Vec3& axis, const Vec3Lanes& border) noexcept;
 
 }  // namespace narpa

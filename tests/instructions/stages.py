@@ -67,7 +67,7 @@ STAGES = [
     ("shutter, rolling, turning craft, 4 spp", 'shutter = {kind = "rolling", row_time_s = 2e-5}', 4,
      {"body": TURNING}),
 ]  # fmt: skip
-FUNCTIONS = ("ImageOptics::", "SunGhost::", "BrownConrady::", "KannalaBrandt::", "filter_of", "lens_direction", "StarLight::", "PointResponse::",
+FUNCTIONS = ("ImageOptics::", "SunGhost::", "BrownConrady::", "KannalaBrandt::", "TabulatedModel::", "filter_of", "lens_direction", "StarLight::", "PointResponse::",
              "read_out", "CameraControl::")
 
 

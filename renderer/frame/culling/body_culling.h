@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "renderer/camera/scene_camera.h"
 #include "renderer/frame/culling/tile_mask.h"
@@ -41,6 +42,20 @@ struct CulledBody {
 /// The box around these bounds.
 [[nodiscard]] BoxNode box_about(const BodyBounds& bounds) noexcept;
 
+/// Cones of the rays through rectangles of tiles: the image's, and those that halves() makes of it. A cone is
+/// computed when it is first asked for; the model does not change.
+class TileCones {
+public:
+    /// `model` outlives it.
+    TileCones(const CameraModel& model, const TileRect& image);
+    /// `number`: 0 for the image; 2 n + 1 and 2 n + 2 for the halves of n.
+    [[nodiscard]] const DirectionCone& at(std::size_t number, const TileRect& rect) noexcept;
+
+private:
+    const CameraModel& model_;
+    std::vector<DirectionCone> cones_;
+};
+
 /// Marks the tiles that may show the body, by the projection of its boxes or of its ellipsoid. `lens` may be null.
 void mark_by_projection(const Pinhole& pinhole, const Camera& camera, const Lens* lens, const CulledBody& body,
                         TileMask& mask) noexcept;
@@ -48,6 +63,6 @@ void mark_by_projection(const Pinhole& pinhole, const Camera& camera, const Lens
 /// (CameraModel::bounds), the parts of a body in spheres: if the cone and a sphere's cone do not overlap, the
 /// rectangle does not show the sphere. The wider of the two is subdivided, down to single tiles and the leaves of
 /// the box tree. Looser and slower than the projection.
-void mark_by_cones(const CameraModel& model, const Lens* lens, const CulledBody& body, TileMask& mask) noexcept;
+void mark_by_cones(TileCones& cones, const Lens* lens, const CulledBody& body, TileMask& mask) noexcept;
 
 }  // namespace narpa

@@ -16,6 +16,7 @@ TileCulling::TileCulling(const Tracer& tracer, const Camera& camera)
       max_listed_(std::min(kMaxListed, tracer.scene().bodies.size())),
       listed_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_)),
       lists_(max_listed_ * listed_.size()) {
+    if (camera.model->pinhole() == nullptr) cones_.emplace(*camera.model, mask_.all());
     for (const std::uint32_t body : tracer.all_bodies()) boxes_.push_back(tracer.shape(body).boxes());
 }
 
@@ -35,7 +36,7 @@ void TileCulling::update(const BodyPoses& at, const Rigid3& T_world_camera, cons
         if (const Pinhole* pinhole = model.pinhole())
             mark_by_projection(*pinhole, camera_, lens, culled, mask_);
         else
-            mark_by_cones(model, lens, culled, mask_);
+            mark_by_cones(*cones_, lens, culled, mask_);
         list(body);
     }
 }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,7 +16,8 @@ namespace narpa {
 
 class TileCulling {
 public:
-    /// Both arguments outlive it. Allocates only here: about 80 bytes per tile, whatever the number of bodies.
+    /// Both arguments outlive it. Allocates only here: about 80 bytes per tile, 160 if the model is no
+    /// pinhole, whatever the number of bodies.
     TileCulling(const Tracer& tracer, const Camera& camera);
 
     /// Updates the lists for these poses. Conservative: if a ray through any point of a tile and of the lens (null:
@@ -44,6 +46,7 @@ private:
     const Camera& camera_;
     int tiles_x_, tiles_y_;
     std::vector<std::span<const BoxNode>> boxes_;  ///< of each body's shape
+    std::optional<TileCones> cones_;               ///< of models without straight lines
     TileMask mask_;                                ///< scratch, for one body at a time
     std::size_t max_listed_;
     std::vector<std::uint8_t> listed_;  ///< number of bodies in each tile's list; max_listed_ + 1: overflow

@@ -40,6 +40,8 @@ public:
         : fd_(fd), left_(max_bytes), deadline_(Clock::now() + std::chrono::seconds(seconds)) {}
 
     bool bytes(void* data, std::size_t size);
+    /// Bytes that may still come.
+    [[nodiscard]] std::uint64_t left() const { return left_; }
     [[nodiscard]] bool timed_out() const { return timed_out_; }
 
 private:

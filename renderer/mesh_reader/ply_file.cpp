@@ -41,20 +41,20 @@ int PlyElement::find(std::initializer_list<std::string_view> names) const {
 }
 
 Result<PlyFile> PlyFile::open(const std::string& path) {
-    Result<std::string> bytes = read_file(path);
-    if (!bytes) return bytes.error();
-    PlyFile file(*std::move(bytes), path);
+    Result<MappedFile> mapped = MappedFile::open(path);
+    if (!mapped) return mapped.error();
+    PlyFile file(*std::move(mapped), path);
     std::size_t end = std::min(file.bytes_.find("\nend_header"), file.bytes_.find("\rend_header"));
     if (end == std::string::npos || !file.bytes_.starts_with("ply"))
         return Error{.what = "no \"end_header\" line, expected a PLY header", .file = path};
-    if (Status read = file.read_header(file.bytes_.substr(0, end)); !read) return read.error();
+    if (Status read = file.read_header(std::string(file.bytes_.substr(0, end))); !read) return read.error();
     // A binary body begins behind a line end as that of the first line.
     end = file.bytes_.find_first_of("\r\n", end + 1 + kEnd.size());
     const bool has_two = file.bytes_.find("\r\n") == file.bytes_.find_first_of("\r\n");
     file.at_ =
         end == std::string::npos ? file.bytes_.size() : std::min(file.bytes_.size(), end + (has_two ? 2 : 1));
     if (file.is_ascii_) {
-        file.text_ = std::make_unique<TextCursor>(std::exchange(file.bytes_, {}), path, kKeywords);
+        file.text_ = std::make_unique<TextCursor>(std::string(file.bytes_), path, kKeywords);
         while (file.text_->next_line() && file.text_->token() != kEnd) {
         }
     }
@@ -117,6 +117,25 @@ bool PlyFile::next(const PlyType& type, double& x) {
     at_ += type.size;
     x = type.read(value.data());
     return true;
+}
+
+PlyRows PlyFile::rows(const PlyElement& element, std::size_t list_length) const {
+    PlyRows rows{.bytes = bytes_.data() + at_, .swap = swap_};
+    std::size_t lists = 0;
+    for (const PlyProperty& p : element.properties) {
+        rows.offsets.push_back(rows.stride);
+        rows.stride += p.count_type == nullptr ? p.type->size : p.count_type->size + list_length * p.type->size;
+        lists += p.count_type != nullptr;
+    }
+    if (is_ascii_ || lists > 1 || rows.stride == 0) return rows;
+    rows.count = std::min(static_cast<std::size_t>(element.count), (bytes_.size() - at_) / rows.stride);
+    return rows;
+}
+
+double PlyRows::swapped(const char* at, const PlyType& type) {
+    std::array<char, 8> value{};
+    std::reverse_copy(at, at + type.size, value.begin());
+    return type.read(value.data());
 }
 
 Status PlyFile::read(const PlyElement& element, std::size_t index, PlyValues& values) {

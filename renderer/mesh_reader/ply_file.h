@@ -8,10 +8,12 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
 #include "base/text/text_cursor.h"
+#include "renderer/assets/mapped_file.h"
 
 namespace narpa {
 
@@ -40,6 +42,23 @@ struct PlyElement {
 /// Values of an element, property by property.
 using PlyValues = std::vector<std::vector<double>>;
 
+/// Rows of an element in a binary file that all have the same size.
+struct PlyRows {
+    const char* bytes = nullptr;
+    std::size_t count = 0, stride = 0;
+    std::vector<std::size_t> offsets{};  ///< of the properties in a row; of a list, that of its length
+    bool swap = false;                   ///< the bytes of each number
+
+    /// A number at `offset` in row i.
+    [[nodiscard]] double value(std::size_t i, std::size_t offset, const PlyType& type) const {
+        const char* const at = bytes + i * stride + offset;
+        return swap ? swapped(at, type) : type.read(at);
+    }
+
+private:
+    static double swapped(const char* at, const PlyType& type);
+};
+
 class PlyFile {
 public:
     static Result<PlyFile> open(const std::string& path);
@@ -49,16 +68,23 @@ public:
 
     /// The values of the next element; `index` counts from 0.
     Status read(const PlyElement& element, std::size_t index, PlyValues& values);
+    /// The next rows of an element, as if each of its lists had `list_length` values: as many as the file has bytes
+    /// for, but none where it is text, or where the element has several lists. `skip` steps over some of them.
+    [[nodiscard]] PlyRows rows(const PlyElement& element, std::size_t list_length) const;
+    void skip(const PlyRows& rows, std::size_t count) { at_ += count * rows.stride; }
     /// An error at the line of the newest element, where the file is text.
     [[nodiscard]] Error error(std::string what) const;
 
 private:
-    PlyFile(std::string bytes, const std::string& path) : path_(path), bytes_(std::move(bytes)) {}
+    PlyFile(MappedFile file, const std::string& path)
+        : path_(path), file_(std::move(file)), bytes_(file_.bytes()) {}
     Status read_header(std::string text);
     Status read_header_line(TextCursor& line, std::string_view keyword);
     bool next(const PlyType& type, double& x);
 
-    std::string path_, bytes_;
+    std::string path_;
+    MappedFile file_;
+    std::string_view bytes_;
     std::unique_ptr<TextCursor> text_{};  ///< null: binary
     std::size_t at_ = 0;
     bool is_ascii_ = false, swap_ = false;

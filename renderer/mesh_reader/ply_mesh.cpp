@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <set>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "renderer/assets/meshes/mesh_readers.h"
 #include "renderer/mesh_reader/mesh_reader.h"
 #include "renderer/mesh_reader/ply_file.h"
+#include "renderer/scene/for_parts.h"
 
 namespace narpa {
 namespace {
@@ -113,7 +115,8 @@ private:
                 has_vertices = true;
                 read = read_vertices(element);
             } else if (has_faces && has_vertices) {
-                read = read_faces(element, [&](std::size_t i, PlyValues& v) { return file_.read(element, i, v); });
+                read = read_faces(element, true,
+                                  [&](std::size_t i, PlyValues& v) { return file_.read(element, i, v); });
             } else {
                 read = keep_values(element, has_faces ? &waiting.emplace_back(Faces{&element, {}}).rows : nullptr);
             }
@@ -123,7 +126,7 @@ private:
             const auto next = [&](std::size_t i, PlyValues& v) -> Status {
                 return v = std::move(faces.rows[i]), Ok{};
             };
-            if (Status read = read_faces(*faces.element, next); !read) return read;
+            if (Status read = read_faces(*faces.element, false, next); !read) return read;
         }
         return Ok{};
     }
@@ -147,8 +150,9 @@ private:
         vertex_colours_ = Colours(e);
         mark(position), mark(normal), mark(uv), mark(vertex_colours_.columns());
         note_unused(e);
+        has_vertex_normals_ = has(normal), has_vertex_uvs_ = has(uv);
         PlyValues v;
-        for (std::size_t i = 0; static_cast<double>(i) < e.count; ++i) {
+        for (std::size_t i = take_vertices(e, position, normal, uv); static_cast<double>(i) < e.count; ++i) {
             if (Status read = file_.read(e, i, v); !read) return read;
             soup_.positions.push_back({value(v, position[0]), value(v, position[1]), value(v, position[2])});
             if (has(normal))
@@ -159,12 +163,39 @@ private:
                 soup_.uvs.push_back({static_cast<float>(value(v, uv[0])), static_cast<float>(value(v, uv[1]))});
             if (vertex_colours_.given()) soup_.colours.push_back(vertex_colours_.read(v));
         }
-        has_vertex_normals_ = has(normal), has_vertex_uvs_ = has(uv);
         return Ok{};
     }
 
-    /// `next(i, values)` gives the values of face `i`.
-    Status read_faces(const PlyElement& e, const auto& next) {
+    /// Reads all vertices in parallel where their rows have one size. Returns how many there are.
+    std::size_t take_vertices(const PlyElement& e, const Columns<3>& position, const Columns<3>& normal,
+                              const Columns<2>& uv) {
+        const PlyRows rows = file_.rows(e, 0);
+        const bool has_lists = std::ranges::any_of(e.properties, [](const PlyProperty& p) { return p.count_type; });
+        if (has_lists || static_cast<double>(rows.count) < e.count) return 0;
+        const std::size_t n = rows.count;
+        soup_.positions.resize(n);
+        if (has(normal)) soup_.normals.resize(n);
+        if (has(uv)) soup_.uvs.resize(n);
+        if (vertex_colours_.given()) soup_.colours.resize(n);
+        for_parts(n, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                const auto x = [&](int column) {
+                    const auto c = static_cast<std::size_t>(column);
+                    return rows.value(i, rows.offsets[c], *e.properties[c].type);
+                };
+                const auto vector = [&](const Columns<3>& c) { return Vec3{x(c[0]), x(c[1]), x(c[2])}; };
+                soup_.positions[i] = vector(position);
+                if (has(normal)) soup_.normals[i] = vec_cast<float>(vector(normal));
+                if (has(uv)) soup_.uvs[i] = {static_cast<float>(x(uv[0])), static_cast<float>(x(uv[1]))};
+                if (vertex_colours_.given()) soup_.colours[i] = vec_cast<float>(vector(vertex_colours_.columns()));
+            }
+        });
+        file_.skip(rows, n);
+        return n;
+    }
+
+    /// `next(i, values)` gives the values of face `i`. `can_take`: they are next in the file.
+    Status read_faces(const PlyElement& e, bool can_take, const auto& next) {
         const int list = e.find({"vertex_indices", "vertex_index"});
         const bool is_strips = e.name == "tristrips";
         if (list < 0) return file_.error(fmt::format("its {} have no vertex_indices", e.name));
@@ -176,8 +207,10 @@ private:
             face_colours_ = colours, faces_have_colours_ = true;
         mark(Columns<3>{list, wedge, e.find({"texnumber"})}), mark(colours.columns());
         note_unused(e);
+        const std::size_t first =
+            can_take && !is_strips ? take_triangles(e, static_cast<std::size_t>(list), colours) : 0;
         PlyValues v;
-        for (std::size_t i = 0; static_cast<double>(i) < e.count; ++i) {
+        for (std::size_t i = first; static_cast<double>(i) < e.count; ++i) {
             if (Status read = next(i, v); !read) return read;
             const std::uint32_t colour = colour_of(colours, v);
             const std::vector<double>& corners = v[static_cast<std::size_t>(list)];
@@ -189,6 +222,54 @@ private:
             if (!added) return added;
         }
         return Ok{};
+    }
+
+    /// Reads faces in parallel, up to the first that is not a triangle of vertices that there are. Returns how
+    /// many.
+    std::size_t take_triangles(const PlyElement& e, std::size_t list, const Colours& colours) {
+        const PlyRows rows = file_.rows(e, 3);
+        const PlyProperty& corners = e.properties[list];
+        const auto have = static_cast<double>(soup_.positions.size());
+        TriangleSoup::Triangles& out = soup_.triangles;
+        if (corners.count_type == nullptr || rows.count == 0 || !out.empty()) return 0;
+        out.position.resize(rows.count);
+        std::atomic<std::size_t> end_of_triangles = rows.count;
+        for_parts(rows.count, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                bool is_triangle = rows.value(i, rows.offsets[list], *corners.count_type) == 3;
+                for (std::size_t k = 0; k < 3 && is_triangle; ++k) {
+                    const std::size_t at = rows.offsets[list] + corners.count_type->size + k * corners.type->size;
+                    const double x = rows.value(i, at, *corners.type);
+                    is_triangle = x >= 0 && x < have && x == std::floor(x);
+                    if (is_triangle) out.position[i][k] = static_cast<std::uint32_t>(x);
+                }
+                if (is_triangle) continue;
+                for (std::size_t least = end_of_triangles; i < least;)
+                    if (end_of_triangles.compare_exchange_weak(least, i)) break;
+                return;
+            }
+        });
+        const std::size_t n = end_of_triangles;
+        out.position.resize(n);
+        if (has_vertex_uvs_) out.uv = out.position;
+        if (has_vertex_normals_) out.normal = out.position;
+        if (vertex_colours_.given()) out.colour = out.position;
+        if (colours.given() && faces_have_colours_) take_colours(e, rows, n, colours);
+        file_.skip(rows, n);
+        return n;
+    }
+
+    /// Of the first n faces.
+    void take_colours(const PlyElement& e, const PlyRows& rows, std::size_t n, const Colours& colours) {
+        soup_.triangles.colour.resize(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const auto band = [&](std::size_t k) {
+                const auto c = static_cast<std::size_t>(colours.columns()[k]);
+                return static_cast<float>(rows.value(i, rows.offsets[c], *e.properties[c].type));
+            };
+            soup_.triangles.colour[i].fill(static_cast<std::uint32_t>(soup_.colours.size()));
+            soup_.colours.push_back({band(0), band(1), band(2)});
+        }
     }
 
     std::uint32_t colour_of(const Colours& colours, const PlyValues& values) {

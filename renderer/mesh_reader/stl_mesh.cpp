@@ -5,10 +5,11 @@
 #include <bit>
 #include <optional>
 
-#include "base/file_bytes.h"
 #include "base/text/text_cursor.h"
+#include "renderer/assets/mapped_file.h"
 #include "renderer/assets/meshes/mesh_readers.h"
 #include "renderer/mesh_reader/mesh_reader.h"
+#include "renderer/scene/for_parts.h"
 
 namespace narpa {
 namespace {
@@ -23,15 +24,14 @@ std::string lower_case(std::string_view word) {
 }
 
 /// A facet of a polygon with one normal.
-void add_facet(TriangleSoup& soup, const std::vector<Vec3>& corners, const Vec3f& normal, std::uint32_t colour) {
+void add_facet(TriangleSoup& soup, const std::vector<Vec3>& corners, const Vec3f& normal) {
     const auto first = static_cast<std::uint32_t>(soup.positions.size()),
                own_normal = static_cast<std::uint32_t>(soup.normals.size());
     soup.positions.insert(soup.positions.end(), corners.begin(), corners.end());
     soup.normals.push_back(normal);
     for (const auto& t : triangulate(corners)) {
         TriangleSoup::Triangle out{.corners = {}};
-        for (std::size_t k = 0; k < 3; ++k)
-            out.corners[k] = {.position = first + t[k], .normal = own_normal, .colour = colour};
+        for (std::size_t k = 0; k < 3; ++k) out.corners[k] = {.position = first + t[k], .normal = own_normal};
         soup.triangles.push_back(out);
     }
 }
@@ -93,7 +93,7 @@ private:
         if (corners_.size() < 3 || corners_.size() > kMaxCorners)
             error_ = in_.error(word, fmt::format("a facet of {} vertices, expected 3", corners_.size()));
         else
-            add_facet(soup_, corners_, normal_, TriangleSoup::kNone);
+            add_facet(soup_, corners_, normal_);
         in_facet_ = false;
     }
 
@@ -109,7 +109,7 @@ private:
 
 class BinaryStl {
 public:
-    BinaryStl(const std::string& bytes, const std::string& path)
+    BinaryStl(std::string_view bytes, const std::string& path)
         : bytes_(bytes),
           path_(path),
           count_(word_at(kHeader)),
@@ -125,18 +125,21 @@ public:
         if (bytes_.substr(0, kHeader).find("MATERIAL=") != std::string::npos)
             warn("MATERIAL= of its header is not used");
         std::size_t other = 0;
+        soup_.positions.resize(3 * count_);
+        soup_.normals.resize(count_);
+        soup_.triangles.position.resize(count_);
+        soup_.triangles.normal.resize(count_);
+        for_parts(count_, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) read_facet(i);
+        });
         for (std::size_t i = 0; i < count_; ++i) {
             const std::size_t at = kHeader + 4 + i * kFacet;
             const auto attribute = static_cast<std::uint16_t>(byte_at(at + 48) | byte_at(at + 49) << 8);
-            std::uint32_t colour = TriangleSoup::kNone;
             if (const bool marked = (attribute & 0x8000) != 0; marked != is_magics)
-                colour = colour_number(attribute, is_magics);
+                for (std::size_t k = 0, colour = colour_number(attribute, is_magics); k < 3; ++k)
+                    soup_.triangles.set(soup_.triangles.colour, i, k, static_cast<std::uint32_t>(colour));
             else if (!is_magics && attribute != 0)
                 ++other;
-            add_facet(soup_,
-                      {vec_cast<double>(vector_at(at + 12)), vec_cast<double>(vector_at(at + 24)),
-                       vec_cast<double>(vector_at(at + 36))},
-                      vector_at(at), colour);
         }
         if (other > 0) warn(fmt::format("attributes of {} facets are no colours and are not used", other));
         if (const std::size_t end = kHeader + 4 + count_ * kFacet; bytes_.size() > end)
@@ -145,6 +148,15 @@ public:
     }
 
 private:
+    void read_facet(std::size_t i) {
+        const std::size_t at = kHeader + 4 + i * kFacet;
+        soup_.normals[i] = vector_at(at);
+        soup_.triangles.normal[i].fill(static_cast<std::uint32_t>(i));
+        for (std::size_t k = 0; k < 3; ++k) {
+            soup_.positions[3 * i + k] = vec_cast<double>(vector_at(at + 12 + 12 * k));
+            soup_.triangles.position[i][k] = static_cast<std::uint32_t>(3 * i + k);
+        }
+    }
     void warn(std::string_view what) { soup_.warnings.push_back(fmt::format("{}: {}", path_, what)); }
     [[nodiscard]] unsigned byte_at(std::size_t at) const { return static_cast<unsigned char>(bytes_[at]); }
     [[nodiscard]] std::uint32_t word_at(std::size_t at) const {
@@ -167,7 +179,7 @@ private:
         return static_cast<std::uint32_t>(soup_.colours.size() - 1);
     }
 
-    const std::string& bytes_;
+    std::string_view bytes_;
     const std::string& path_;
     std::size_t count_, color_at_;
     TriangleSoup soup_;
@@ -176,21 +188,22 @@ private:
 }  // namespace
 
 MeshMessage read_stl(const std::string& path) {
-    Result<std::string> bytes = read_file(path);
-    if (!bytes) return {.error = bytes.error().what};
+    const Result<MappedFile> file = MappedFile::open(path);
+    if (!file) return {.error = file.error().what};
+    const std::string_view bytes = file->bytes();
     std::size_t count = 0;
-    for (std::size_t i = 4; i-- > 0 && bytes->size() >= kHeader + 4;)
-        count = count << 8 | static_cast<unsigned char>((*bytes)[kHeader + i]);
+    for (std::size_t i = 4; i-- > 0 && bytes.size() >= kHeader + 4;)
+        count = count << 8 | static_cast<unsigned char>(bytes[kHeader + i]);
     const std::size_t size = kHeader + 4 + count * kFacet;
-    if (bytes->size() >= kHeader + 4 && bytes->size() == size) return BinaryStl(*bytes, path).read();
-    const std::string start = plain_lines(bytes->substr(0, 1024));
+    if (bytes.size() >= kHeader + 4 && bytes.size() == size) return BinaryStl(bytes, path).read();
+    const std::string start = plain_lines(std::string(bytes.substr(0, 1024)));
     const std::size_t first = start.find_first_not_of(" \t\n");
     if (first != std::string::npos && lower_case(std::string_view(start).substr(first, 5)) == "solid")
-        return TextStl(*std::move(bytes), path).read();
-    if (bytes->size() < kHeader + 4 || bytes->size() < size)
+        return TextStl(std::string(bytes), path).read();
+    if (bytes.size() < kHeader + 4 || bytes.size() < size)
         return {.error = fmt::format("neither STL text (solid ...) nor whole binary STL: {} bytes, expected {}",
-                                     bytes->size(), size)};
-    return BinaryStl(*bytes, path).read();
+                                     bytes.size(), size)};
+    return BinaryStl(bytes, path).read();
 }
 
 }  // namespace narpa

@@ -27,7 +27,7 @@ struct PlainMaterial {
 };
 
 struct MeshMessage {
-    static constexpr std::uint64_t kMagic = 0x3130'4853'454d'4e02;
+    static constexpr std::uint64_t kMagic = 0x3130'4853'454d'4e03;
     std::uint64_t magic = kMagic;
     std::string error{};  ///< empty: the mesh follows
     int line = 0, column = 0;
@@ -46,7 +46,7 @@ bool plain(Stream& stream, T& x) {
     return stream.bytes(&x, sizeof x);
 }
 
-/// A receiver allocates memory as data arrive, not by the announced length.
+/// A receiver fails where more is announced than it may take.
 template <class Stream, class Array>
 bool array(Stream& stream, Array& v) {
     using T = typename Array::value_type;
@@ -54,6 +54,10 @@ bool array(Stream& stream, Array& v) {
     constexpr std::size_t kStep = (std::size_t{1} << 20) / sizeof(T);
     std::uint64_t count = v.size();
     if (!plain(stream, count)) return false;
+    if constexpr (Stream::kReceives) {
+        if (count > stream.left() / sizeof(T)) return false;
+        v.reserve(count);
+    }
     for (std::size_t at = 0, n = 0; at < count; at += n) {
         n = std::min<std::size_t>(kStep, count - at);
         if constexpr (Stream::kReceives) v.resize(at + n);
@@ -92,7 +96,9 @@ bool transfer(Stream& stream, MeshMessage& m) {
     if (!m.error.empty()) return true;
     TriangleSoup& s = m.soup;
     return array(stream, s.positions) && array(stream, s.normals) && array(stream, s.uvs) &&
-           array(stream, s.colours) && array(stream, s.triangles) &&
+           array(stream, s.colours) && array(stream, s.triangles.position) && array(stream, s.triangles.uv) &&
+           array(stream, s.triangles.normal) && array(stream, s.triangles.colour) &&
+           array(stream, s.triangles.materials) &&
            list(stream, s.warnings, [&](std::string& text) { return array(stream, text); }) &&
            list(stream, m.materials, [&](PlainMaterial& material) { return transfer(stream, material); });
 }

@@ -33,17 +33,20 @@ MeshMaterial checked(PlainMaterial&& m) {
 }
 
 bool indices_are_sound(const TriangleSoup& s) {
-    const auto in = [](std::uint32_t index, std::size_t size) {
-        return index == TriangleSoup::kNone || index < size;
+    const auto below = [&](const TriangleSoup::Column& column, std::size_t size, bool may_be_none) {
+        return std::ranges::all_of(column, [&](const auto& three) {
+            return std::ranges::all_of(three, [&](std::uint32_t index) {
+                return index < size || (may_be_none && index == TriangleSoup::kNone);
+            });
+        });
     };
-    for (const TriangleSoup::Triangle& t : s.triangles) {
-        if (t.material >= s.materials.size()) return false;
-        for (const TriangleSoup::Corner& c : t.corners)
-            if (c.position >= s.positions.size() || !in(c.uv, s.uvs.size()) || !in(c.normal, s.normals.size()) ||
-                !in(c.colour, s.colours.size()))
-                return false;
-    }
-    return true;
+    const TriangleSoup::Triangles& t = s.triangles;
+    const auto fits = [&](const auto& column) { return column.empty() || column.size() == t.size(); };
+    return fits(t.uv) && fits(t.normal) && fits(t.colour) && fits(t.materials) &&
+           (t.empty() || !s.materials.empty()) && below(t.position, s.positions.size(), false) &&
+           below(t.uv, s.uvs.size(), true) && below(t.normal, s.normals.size(), true) &&
+           below(t.colour, s.colours.size(), true) &&
+           std::ranges::all_of(t.materials, [&](std::uint16_t material) { return material < s.materials.size(); });
 }
 
 }  // namespace

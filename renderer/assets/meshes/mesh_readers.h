@@ -25,11 +25,60 @@ struct TriangleSoup {
         std::array<Corner, 3> corners;
         std::uint16_t material = 0;
     };
+    using Column = std::vector<std::array<std::uint32_t, 3>>;
+    /// Triangles, column by column: most large meshes have positions alone.
+    struct Triangles {
+        Column position, uv, normal, colour;   ///< the last three: empty where no corner has any
+        std::vector<std::uint16_t> materials;  ///< empty: all are 0
+
+        [[nodiscard]] std::size_t size() const { return position.size(); }
+        [[nodiscard]] bool empty() const { return position.empty(); }
+        [[nodiscard]] Triangle operator[](std::size_t i) const {
+            Triangle t{.corners = {}, .material = material(i)};
+            for (std::size_t k = 0; k < 3; ++k)
+                t.corners[k] = {position[i][k], at(uv, i, k), at(normal, i, k), at(colour, i, k)};
+            return t;
+        }
+        /// Of a corner; kNone where it has none.
+        [[nodiscard]] static std::uint32_t at(const Column& column, std::size_t i, std::size_t k) {
+            return column.empty() ? kNone : column[i][k];
+        }
+        [[nodiscard]] std::uint16_t material(std::size_t i) const { return materials.empty() ? 0 : materials[i]; }
+
+        void push_back(const Triangle& t) {
+            const auto& c = t.corners;
+            position.push_back({c[0].position, c[1].position, c[2].position});
+            append(uv, {c[0].uv, c[1].uv, c[2].uv});
+            append(normal, {c[0].normal, c[1].normal, c[2].normal});
+            append(colour, {c[0].colour, c[1].colour, c[2].colour});
+            if (t.material != 0 || !materials.empty()) {
+                materials.resize(size(), 0);
+                materials.back() = t.material;
+            }
+        }
+        void set(Column& column, std::size_t i, std::size_t k, std::uint32_t index) {
+            column.resize(size(), kNoneOfThree);
+            column[i][k] = index;
+        }
+        void set_material(std::size_t i, std::uint16_t material) {
+            materials.resize(size(), 0);
+            materials[i] = material;
+        }
+
+    private:
+        static constexpr std::array<std::uint32_t, 3> kNoneOfThree{kNone, kNone, kNone};
+        /// To a column that is empty, or one shorter than `position`.
+        void append(Column& column, const std::array<std::uint32_t, 3>& indices) {
+            if (column.empty() && indices == kNoneOfThree) return;
+            column.resize(size() - 1, kNoneOfThree);
+            column.push_back(indices);
+        }
+    };
     std::vector<Vec3> positions;  ///< in the file's unit
     std::vector<Vec3f> normals;   ///< of any length
     std::vector<std::array<float, 2>> uvs;
     std::vector<Rgb> colours;  ///< linear, of any size
-    std::vector<Triangle> triangles;
+    Triangles triangles;
     std::vector<MeshMaterial> materials;
     std::vector<std::string> warnings;
     bool has_smoothing_groups = false;  ///< on faces without normals of their own
@@ -64,7 +113,7 @@ Status read_obj_materials(const std::string& path, const std::vector<std::string
 Result<TriangleSoup> read_plates(const std::string& path);
 
 /// Triangles, as numbers of vertices in the file.
-using PlateFaces = std::vector<std::array<std::uint32_t, 3>>;
+using PlateFaces = TriangleSoup::Column;
 /// Whether faces count vertices from 0 or 1. 0: a face has vertex 0; or none has the last vertex, and counted from
 /// 0 the surface is closed rather than open, or has fewer edges without length, or, by 1 %, more volume for its
 /// area (open: shorter edges). A warning tells which, unless a face has the last vertex. Error: both 0 and a number

@@ -248,7 +248,6 @@ private:
     }
 
     void cut_polygons() {
-        soup_.triangles.reserve(corners_.size() - 2 * polygons_.size());
         std::vector<Vec3> points;
         for (const Polygon& polygon : polygons_) {
             const TriangleSoup::Corner* corner = &corners_[polygon.first];

@@ -167,9 +167,7 @@ private:
     }
 
     bool find_base() {
-        PlateFaces faces;
-        for (const auto& t : soup_.triangles)
-            faces.push_back({t.corners[0].position, t.corners[1].position, t.corners[2].position});
+        PlateFaces& faces = soup_.triangles.position;
         const Result<std::uint32_t> base = first_vertex_ == 0.0 || first_vertex_ == 1.0
                                                ? check_base(faces, static_cast<std::uint32_t>(*first_vertex_))
                                                : plate_base(faces, soup_.positions, path_, soup_.warnings);
@@ -177,8 +175,8 @@ private:
             error_ = base.error();
             return false;
         }
-        for (auto& t : soup_.triangles)
-            for (auto& corner : t.corners) corner.position -= *base;
+        for (auto& face : faces)
+            for (std::uint32_t& v : face) v -= *base;
         return true;
     }
 

@@ -19,9 +19,9 @@ struct FlatCorner {
 std::vector<FlatCorner> flat_corners(const TriangleSoup& soup) {
     std::vector<FlatCorner> out;
     out.reserve(3 * soup.triangles.size());
-    for (const TriangleSoup::Triangle& t : soup.triangles) {
+    for (const auto& corners : soup.triangles.position) {
         std::array<Vec3, 3> p;
-        for (std::size_t i = 0; i < 3; ++i) p[i] = soup.positions[t.corners[i].position];
+        for (std::size_t i = 0; i < 3; ++i) p[i] = soup.positions[corners[i]];
         const Vec3 area = cross(p[1] - p[0], p[2] - p[0]);
         const double twice = norm(area);
         for (std::size_t i = 0; i < 3; ++i) {
@@ -39,7 +39,7 @@ std::vector<std::size_t> by_position(const TriangleSoup& soup, const std::vector
     for (std::size_t k = 0; k < flat.size(); ++k)
         if (flat[k].angle > 0) corners.push_back(k);
     const auto key = [&](std::size_t k) {
-        const Vec3& p = soup.positions[soup.triangles[k / 3].corners[k % 3].position];
+        const Vec3& p = soup.positions[soup.triangles.position[k / 3][k % 3]];
         return std::array{p.x, p.y, p.z};
     };
     std::ranges::stable_sort(corners, {}, key);
@@ -51,10 +51,10 @@ std::vector<std::size_t> by_position(const TriangleSoup& soup, const std::vector
 void add_smooth_normals(TriangleSoup& soup, double crease_rad) {
     const std::vector<FlatCorner> flat = flat_corners(soup);
     const std::vector<std::size_t> corners = by_position(soup, flat);
-    const auto corner = [&](std::size_t k) -> TriangleSoup::Corner& {
-        return soup.triangles[k / 3].corners[k % 3];
+    TriangleSoup::Triangles& triangles = soup.triangles;
+    const auto position = [&](std::size_t k) -> const Vec3& {
+        return soup.positions[triangles.position[k / 3][k % 3]];
     };
-    const auto position = [&](std::size_t k) -> const Vec3& { return soup.positions[corner(k).position]; };
     const double min_cosine = std::cos(crease_rad);
     for (auto first = corners.begin(); first != corners.end();) {
         const auto end = std::find_if(first, corners.end(), [&](std::size_t k) {
@@ -68,7 +68,7 @@ void add_smooth_normals(TriangleSoup& soup, double crease_rad) {
                 if (*other == *k || dot(flat[*k].normal, flat[*other].normal) > min_cosine)
                     sum = sum + flat[*other].angle * flat[*other].normal;
             if (!(norm(sum) > kCancelled)) continue;
-            corner(*k).normal = static_cast<std::uint32_t>(soup.normals.size());
+            triangles.set(triangles.normal, *k / 3, *k % 3, static_cast<std::uint32_t>(soup.normals.size()));
             soup.normals.push_back(vec_cast<float>(sum));
         }
         first = end;

@@ -99,7 +99,7 @@ void MeshTrial::compare(const Result<TriangleSoup>& soup, const std::string& wor
     ASSERT_EQ(3 * soup->triangles.size(), expected_.size()) << words;
     for (std::size_t i = 0; i < expected_.size(); ++i) {
         const Expected& e = expected_[i];
-        const TriangleSoup::Corner& c = soup->triangles[i / 3].corners[i % 3];
+        const TriangleSoup::Corner c = soup->triangles[i / 3].corners[i % 3];
         const double size = 1e-6 * (1 + norm(e.position));
         ASSERT_LT(norm(soup->positions[c.position] - e.position), 10 * size) << i << words;
         ASSERT_EQ(c.normal != TriangleSoup::kNone, e.normal.has_value()) << words;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "base/constants.h"
+#include "renderer/scene/for_parts.h"
 
 namespace narpa {
 namespace {
@@ -34,27 +36,60 @@ Status check_mesh(const Scene& scene, const Mesh& mesh) {
     return Ok{};
 }
 
+struct Extent {
+    Vec3 low{kInfinity, kInfinity, kInfinity}, high = -low;
+
+    void add(const Vec3& p) {
+        for (int k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
+    }
+    void add(const Extent& other) { add(other.low), add(other.high); }
+};
+
+/// Calls add(part, i) for each i below n and returns the parts' sum by merge(sum, part), which does not depend on
+/// order.
+template <class Part>
+Part over_all(std::size_t n, const auto& add, const auto& merge) {
+    Part sum{};
+    std::mutex merging;
+    for_parts(n, [&](std::size_t begin, std::size_t end) {
+        Part part{};
+        for (std::size_t i = begin; i < end; ++i) add(part, i);
+        const std::scoped_lock lock(merging);
+        merge(sum, part);
+    });
+    return sum;
+}
+Extent extent_of(std::size_t n, const auto& add) {
+    return over_all<Extent>(n, add, [](Extent& sum, const Extent& part) { sum.add(part); });
+}
+/// The largest of values that are not negative.
+double largest_of(std::size_t n, const auto& value) {
+    return over_all<double>(
+        n, [&](double& most, std::size_t i) { most = std::max(most, value(i)); },
+        [](double& sum, double part) { sum = std::max(sum, part); });
+}
+
 /// The smallest ellipsoid that holds all vertices, of those with the centre and the proportions of the bounding
 /// box. For a box its outline is up to 2.4 times as large as the box's own. A flat mesh keeps a thousandth of its
 /// largest extent in thickness.
 BodyBounds ellipsoid_about(const Mesh& mesh) {
-    Vec3 low{kInfinity, kInfinity, kInfinity}, high = -low;
-    const auto for_each_vertex = [&](const auto& f) {
-        for (const auto& face : mesh.faces)
-            for (const std::uint32_t vertex : face) f(mesh.origin_m + vec_cast<double>(mesh.positions[vertex]));
-    };
-    for_each_vertex([&](const Vec3& p) {
-        for (int k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
-    });
     if (mesh.faces.empty()) return {{}, {}};
+    const auto vertex = [&](std::uint32_t v) { return mesh.origin_m + vec_cast<double>(mesh.positions[v]); };
+    const auto [low, high] = extent_of(mesh.faces.size(), [&](Extent& part, std::size_t i) {
+        for (const std::uint32_t v : mesh.faces[i]) part.add(vertex(v));
+    });
     BodyBounds b{0.5 * (low + high), 0.5 * (high - low)};
     const double largest = std::max({b.semi_axes_m.x, b.semi_axes_m.y, b.semi_axes_m.z});
     for (int k = 0; k < 3; ++k) b.semi_axes_m[k] = std::max(b.semi_axes_m[k], 1e-3 * largest);
-    double farthest2 = 0;  // at most 3, at a corner of the box
-    for_each_vertex([&](const Vec3& p) {
-        const Vec3 unit = (p - b.centre_m) / b.semi_axes_m;
-        farthest2 = std::max(farthest2, dot(unit, unit));
-    });
+    const double farthest2 =
+        largest_of(mesh.faces.size(), [&](std::size_t i) {  // at most 3, at a corner of the box
+            double most = 0;
+            for (const std::uint32_t v : mesh.faces[i]) {
+                const Vec3 unit = (vertex(v) - b.centre_m) / b.semi_axes_m;
+                most = std::max(most, dot(unit, unit));
+            }
+            return most;
+        });
     b.semi_axes_m *= std::sqrt(farthest2) * (1 + 1e-9);
     return b;
 }
@@ -70,20 +105,14 @@ Result<std::shared_ptr<const MeshShape>> MeshShape::build(RTCDevice device, cons
 
 MeshShape::MeshShape(const Scene& scene, const Mesh& mesh)
     : mesh_(mesh), closed_(!mesh.height_field && is_closed(mesh)) {
-    Vec3 low{}, high{};
-    if (!mesh.positions.empty()) low = high = vec_cast<double>(mesh.positions.front());
-    for (const Vec3f& p : mesh.positions)
-        for (int k = 0; k < 3; ++k) {
-            low[k] = std::min<double>(low[k], p[k]);
-            high[k] = std::max<double>(high[k], p[k]);
-        }
-    centre_ = mesh.origin_m + 0.5 * (low + high);
-    double reach_m = 0;  // about the body's origin
-    for (const Vec3f& p : mesh.positions) {
-        const Vec3 at = mesh.origin_m + vec_cast<double>(p);
-        radius_m_ = std::max(radius_m_, norm(at - centre_));
-        reach_m = std::max(reach_m, norm(at));
-    }
+    const std::size_t n = mesh.positions.size();
+    Extent extent{{}, {}};
+    if (n > 0)
+        extent = extent_of(n, [&](Extent& part, std::size_t i) { part.add(vec_cast<double>(mesh.positions[i])); });
+    centre_ = mesh.origin_m + 0.5 * (extent.low + extent.high);
+    const auto vertex = [&](std::size_t i) { return mesh.origin_m + vec_cast<double>(mesh.positions[i]); };
+    radius_m_ = largest_of(n, [&](std::size_t i) { return norm(vertex(i) - centre_); });
+    double reach_m = largest_of(n, [&](std::size_t i) { return norm(vertex(i)); });  // about the body's origin
     // A margin for the rounding of a ray that comes from far away.
     radius_m_ *= 1 + 1e-5;
     reach_m *= 1 + 1e-5;
@@ -107,18 +136,20 @@ Status MeshShape::build_hierarchy(RTCDevice device) {
     };
     scene_.reset(rtcNewScene(device));
     const embree::Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+    using Corners = std::array<std::uint32_t, 3>;
+    static constexpr Corners kNoFace{};  // Embree needs an array, even where there are no faces
+    const std::span<const Corners> indices = mesh_.faces.empty() ? std::span(&kNoFace, 1) : std::span(mesh_.faces);
     auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(
         geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh_.positions.size() + 1));
-    auto* indices = static_cast<std::array<std::uint32_t, 3>*>(
-        rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                3 * sizeof(std::uint32_t), std::max<std::size_t>(1, mesh_.faces.size())));
-    if (vertices == nullptr || indices == nullptr)
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.data(), 0,
+                               sizeof(Corners), indices.size());
+    if (vertices == nullptr)
         return failed("has no memory for " + std::to_string(mesh_.faces.size()) + " triangles");
     vertices[mesh_.positions.size()] = {};  // padding: each vertex is read with four bytes behind it
-    indices[0] = {0, 0, 0};
-    for (std::size_t i = 0; i < mesh_.positions.size(); ++i)
-        vertices[i] = vec_cast<float>(vec_cast<double>(mesh_.positions[i]) + (mesh_.origin_m - vertex_origin_));
-    std::copy(mesh_.faces.begin(), mesh_.faces.end(), indices);
+    for_parts(mesh_.positions.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            vertices[i] = vec_cast<float>(vec_cast<double>(mesh_.positions[i]) + (mesh_.origin_m - vertex_origin_));
+    });
     vertices_ = vertices;
 
     rtcCommitGeometry(geometry.get());

@@ -83,10 +83,6 @@ double hills_m(const Vec3& p) {
 
 }  // namespace
 
-std::vector<MaterialSpec> terrain_materials() {
-    return {{"ground", {0.4, 0.4, 0.4}, {}, 1, "ground.png"}};
-}
-
 Mesh build_terrain() {
     const auto holes = craters();
     const auto height = [&holes](double x, double y) {
@@ -108,10 +104,6 @@ Mesh build_terrain() {
             return Uv{static_cast<double>(i) / kCells, static_cast<double>(j) / kCells};
         });
     return mesh;
-}
-
-std::vector<MaterialSpec> small_body_materials() {
-    return {{"regolith", {0.16, 0.15, 0.14}}};
 }
 
 Mesh build_small_body() {

@@ -86,8 +86,8 @@ double bump_height_m(const Bump& f, double distance_m) {
 
 }  // namespace
 
-std::vector<MaterialSpec> landing_materials() {
-    return {{"ground", {0.25, 0.22, 0.19}}, {"gold", {0.6, 0.45, 0.2}}, {"metal", {0.5, 0.5, 0.5}}};
+std::vector<MaterialSpec> lander_materials() {
+    return {{"gold", {0.6, 0.45, 0.2}}, {"metal", {0.5, 0.5, 0.5}}};
 }
 
 namespace {

@@ -15,9 +15,19 @@ struct Output {
     std::string directory;
 
     void mesh(const std::string& name, const Mesh& mesh, const std::vector<MaterialSpec>& materials,
-              ObjParts parts = ObjParts::all) const {
+              MeshParts parts = MeshParts::all) const {
         mesh.write_obj(directory + "/" + name + ".obj", name + ".mtl", parts);
         write_mtl(directory + "/" + name + ".mtl", materials);
+        say(name, mesh);
+    }
+    /// Of one material, which the scenes give: a fourth of the size, for large meshes.
+    void plain_mesh(const std::string& name, const Mesh& mesh, MeshParts parts = MeshParts::untextured) const {
+        mesh.write_ply(directory + "/" + name + ".ply", parts);
+        say(name, mesh);
+    }
+
+private:
+    static void say(const std::string& name, const Mesh& mesh) {
         std::printf("%s: %zu triangles\n", name.c_str(), mesh.triangle_count());
     }
 };
@@ -29,18 +39,18 @@ bool write_scene(std::string_view scene, const Output& out) {
         write_textures(out.directory);
         write_approach(out.directory + "/approach.csv");
     } else if (scene == "craft") {
-        out.mesh("craft", build_craft(), craft_materials(), ObjParts::positions);
+        out.mesh("craft", build_craft(), craft_materials(), MeshParts::positions);
     } else if (scene == "descent") {
-        out.mesh("terrain", build_terrain(), terrain_materials());
+        out.plain_mesh("terrain", build_terrain(), MeshParts::all);
         write_ground_texture(out.directory);
     } else if (scene == "small_body") {
-        out.mesh("small_body", build_small_body(), small_body_materials());
+        out.plain_mesh("small_body", build_small_body());
     } else if (scene == "tag_board") {
         out.mesh("tag_board", build_tag_board(), tag_board_materials());
     } else if (scene == "landing") {
-        out.mesh("landing_site", build_landing_site(), landing_materials());
-        out.mesh("landing_map", build_landing_map(), landing_materials());
-        out.mesh("lander", build_lander(), landing_materials());
+        out.plain_mesh("landing_site", build_landing_site());
+        out.plain_mesh("landing_map", build_landing_map());
+        out.mesh("lander", build_lander(), lander_materials());
     } else if (scene == "terrain") {
         write_highland(out.directory + "/highland.png");
     } else {

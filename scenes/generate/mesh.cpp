@@ -1,10 +1,14 @@
 #include "scenes/generate/mesh.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <stdexcept>
+#include <utility>
 
 namespace narpa::scenes {
 namespace {
@@ -24,12 +28,19 @@ std::uint16_t index_of(std::vector<std::string>& names, const std::string& name)
     return static_cast<std::uint16_t>(it - names.begin());
 }
 
-/// Numbers in the "C" form whatever the locale; never "-0".
+/// A number with a fixed number of decimals in the "C" form, whatever the locale; never "-0". `out` gets it without
+/// zeros at its end and before its point.
 void append(std::string& out, double x, int decimals) {
     char text[40];
-    const auto end = std::to_chars(text, text + sizeof text, x, std::chars_format::fixed, decimals).ptr;
-    char* begin = text;
-    if (*begin == '-' && std::all_of(begin + 1, end, [](char c) { return c == '0' || c == '.'; })) ++begin;
+    const char* end = std::to_chars(text, text + sizeof text, x, std::chars_format::fixed, decimals).ptr;
+    const char* begin = text;
+    while (end[-1] == '0') --end;  // all numbers here have a point
+    if (end[-1] == '.') --end;
+    const bool is_negative = *begin == '-';
+    if (is_negative) ++begin;
+    if (*begin == '0') ++begin;
+    if (begin == end) return void(out += '0');
+    if (is_negative) out += '-';
     out.append(begin, end);
 }
 void append(std::string& out, const char* key, std::initializer_list<double> numbers, int decimals) {
@@ -37,24 +48,46 @@ void append(std::string& out, const char* key, std::initializer_list<double> num
     for (const double x : numbers) out += ' ', append(out, x, decimals);
     out += '\n';
 }
+constexpr int kPositionDecimals = 5, kUvDecimals = 4, kNormalDecimals = 3;
+/// The number that the text stands for, in single precision.
+float rounded(double x, int decimals) {
+    char text[40];
+    const auto end = std::to_chars(text, text + sizeof text, x, std::chars_format::fixed, decimals).ptr;
+    double out = 0;
+    std::from_chars(text, end, out);
+    return static_cast<float>(out + 0.0);
+}
 
-/// Lines of one OBJ key, each written once and numbered from 1 in order of appearance.
+/// Bytes of a number in this machine's order.
+template <class T>
+void append_bytes(std::string& out, T x) {
+    const auto bytes = std::bit_cast<std::array<char, sizeof x>>(x);
+    out.append(bytes.data(), bytes.size());
+}
+
+/// Lines of one OBJ key in `text`, each written once and numbered from 1 in order of appearance.
 class Lines {
 public:
-    Lines(const char* key, int decimals) : key_(key), decimals_(decimals) {}
+    Lines(const char* key, int decimals, std::string& text) : key_(key), decimals_(decimals), text_(text) {}
     std::uint32_t number(std::initializer_list<double> numbers) {
         std::array<std::int64_t, 3> id{};
         std::size_t i = 0;
         for (const double x : numbers) id[i++] = std::llround(x * std::pow(10.0, decimals_));
         const auto [it, is_new] = seen_.try_emplace(id, static_cast<std::uint32_t>(seen_.size() + 1));
-        if (is_new) append(text, key_, numbers, decimals_);
+        if (is_new) append(text_, key_, numbers, decimals_);
         return it->second;
     }
-    std::string text;
+    /// How faces may name a line: by its number, or, where that is shorter, counted back from the newest line as
+    /// -1.
+    [[nodiscard]] std::string name(std::uint32_t number) const {
+        std::string forwards = std::to_string(number), back = "-" + std::to_string(seen_.size() + 1 - number);
+        return back.size() < forwards.size() ? back : forwards;
+    }
 
 private:
     const char* key_;
     int decimals_;
+    std::string& text_;
     std::map<std::array<std::int64_t, 3>, std::uint32_t> seen_;
 };
 
@@ -123,29 +156,93 @@ void Mesh::polygon(const std::vector<Vec3>& corners, const Vec3& inside, double 
     for (std::uint32_t i = 2; i < points.size(); ++i) add_face(first, first + i - 1, first + i);
 }
 
-void Mesh::write_obj(const std::string& path, const std::string& mtl_name, ObjParts wanted) const {
-    Lines positions("v", 5), uvs("vt", 4), normals("vn", 3);
-    std::map<std::pair<std::uint16_t, std::uint16_t>, std::string> groups;  // by part, then material
-    for (const Face& face : faces_) {
-        std::string& out = groups[{face.part, face.material}];
-        out += 'f';
-        for (const std::uint32_t index : face.vertices) {
-            const Vertex& v = vertices_[index];
-            out += ' ' + std::to_string(positions.number({v.position.x, v.position.y, v.position.z}));
-            if (wanted == ObjParts::positions) continue;
-            out += '/' + std::to_string(uvs.number({v.uv[0], v.uv[1]})) + '/' +
-                   std::to_string(normals.number({v.normal.x, v.normal.y, v.normal.z}));
-        }
-        out += '\n';
+bool Mesh::is_convex(const std::array<std::uint32_t, 4>& quad) const {
+    const auto p = [&](std::size_t i) -> const Vec3& { return vertices_[quad[i % 4]].position; };
+    const Vec3 n = cross(p(1) - p(0), p(2) - p(0)) + cross(p(2) - p(0), p(3) - p(0));
+    const double least = 1e-3 * norm(n);
+    int main = 0;
+    for (int axis = 1; axis < 3; ++axis)
+        if (std::abs(n[axis]) > std::abs(n[main])) main = axis;
+    const auto turns_left = [&](std::size_t a, std::size_t b, std::size_t c) {
+        return cross(p(b) - p(a), p(c) - p(a))[main] * (n[main] < 0 ? -1 : 1) > least;
+    };
+    for (std::size_t i = 0; i < 4; ++i)
+        if (!turns_left(i, i + 1, i + 2)) return false;
+    return turns_left(0, 1, 2) && turns_left(0, 2, 3);
+}
+
+std::vector<Mesh::Polygon> Mesh::polygons() const {
+    std::vector<Face> faces = faces_;
+    std::ranges::stable_sort(faces, {}, [](const Face& f) { return std::pair(f.part, f.material); });
+    std::vector<Polygon> out;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+        const Face& face = faces[i];
+        const auto& [a, b, c] = face.vertices;
+        out.push_back({{a, b, c}, face.part, face.material});
+        if (i + 1 == faces.size()) break;
+        const Face& next = faces[i + 1];
+        const auto& [d, e, last] = next.vertices;
+        const bool is_fan = d == a && e == c && next.part == face.part && next.material == face.material;
+        if (is_fan && is_convex({a, b, c, last})) out.back().vertices.push_back(last), ++i;
     }
-    std::string text = "mtllib " + mtl_name + "\n" + positions.text + uvs.text + normals.text;
-    int part = -1;
-    for (const auto& [group, lines] : groups) {
-        if (group.first != part) text += "o " + parts_[group.first] + "\n";
-        part = group.first;
-        text += "usemtl " + materials_[group.second] + "\n" + lines;
+    return out;
+}
+
+void Mesh::write_obj(const std::string& path, const std::string& mtl_name, MeshParts wanted) const {
+    std::string text = "mtllib " + mtl_name + "\n";
+    Lines positions("v", kPositionDecimals, text), uvs("vt", kUvDecimals, text),
+        normals("vn", kNormalDecimals, text);
+    int part = -1, material = -1;
+    for (const Polygon& polygon : polygons()) {
+        if (polygon.part != part) text += "o " + parts_[polygon.part] + "\n";
+        if (polygon.part != part || polygon.material != material)
+            text += "usemtl " + materials_[polygon.material] + "\n";
+        part = polygon.part, material = polygon.material;
+        std::vector<std::array<std::uint32_t, 3>> corners;
+        for (const std::uint32_t index : polygon.vertices) {
+            const Vertex& v = vertices_[index];
+            auto& corner = corners.emplace_back();
+            corner[0] = positions.number({v.position.x, v.position.y, v.position.z});
+            if (wanted == MeshParts::positions) continue;
+            corner[1] = uvs.number({v.uv[0], v.uv[1]});
+            corner[2] = normals.number({v.normal.x, v.normal.y, v.normal.z});
+        }
+        text += 'f';
+        for (const auto& [position, uv, normal] : corners) {
+            text += ' ' + positions.name(position);
+            if (wanted != MeshParts::positions) text += '/' + uvs.name(uv) + '/' + normals.name(normal);
+        }
+        text += '\n';
     }
     write_file(path, text);
+}
+
+void Mesh::write_ply(const std::string& path, MeshParts wanted) const {
+    std::map<std::string, std::uint32_t> numbers;  // of vertices, by their bytes
+    std::string vertices, faces;
+    std::size_t count = 0;
+    for (const Polygon& polygon : polygons()) {
+        ++count;
+        append_bytes(faces, static_cast<std::uint8_t>(polygon.vertices.size()));
+        for (const std::uint32_t index : polygon.vertices) {
+            const Vertex& v = vertices_[index];
+            std::string bytes;
+            for (int k = 0; k < 3; ++k) append_bytes(bytes, rounded(v.position[k], kPositionDecimals));
+            for (int k = 0; k < 3; ++k) append_bytes(bytes, rounded(v.normal[k], kNormalDecimals));
+            for (std::size_t k = 0; k < 2 && wanted == MeshParts::all; ++k)
+                append_bytes(bytes, rounded(v.uv[k], kUvDecimals));
+            const auto [it, is_new] = numbers.try_emplace(bytes, static_cast<std::uint32_t>(numbers.size()));
+            if (is_new) vertices += bytes;
+            append_bytes(faces, it->second);
+        }
+    }
+    std::string head = "ply\nformat ";
+    head += std::endian::native == std::endian::little ? "binary_little_endian" : "binary_big_endian";
+    head += " 1.0\nelement vertex " + std::to_string(numbers.size()) + "\n";
+    for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) head += std::string("property float ") + name + "\n";
+    if (wanted == MeshParts::all) head += "property float s\nproperty float t\n";
+    head += "element face " + std::to_string(count) + "\nproperty list uchar uint vertex_indices\nend_header\n";
+    write_file(path, head + vertices + faces);
 }
 
 void write_mtl(const std::string& path, const std::vector<MaterialSpec>& materials) {

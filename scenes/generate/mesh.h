@@ -1,4 +1,4 @@
-/// scenes/generate/mesh.h - a mesh under construction, and its OBJ and MTL files.
+/// scenes/generate/mesh.h - a mesh under construction, and its OBJ, MTL and PLY files.
 ///
 /// Every surface that goes in belongs to a closed shell with its faces counter-clockwise seen from outside. Shells
 /// may touch or run into each other. Positions are kept on a grid of 10 um, so that neighbouring surfaces meet
@@ -27,10 +27,11 @@ struct MaterialSpec {
     Vec3 emission{};  ///< W m^-2 sr^-1
 };
 
-/// What a face of an OBJ file names of its corners.
-enum class ObjParts : std::uint8_t {
-    all,        ///< position, texture coordinates, normal
-    positions,  ///< nothing else: a third of the size, for flat faces without textures
+/// What a file has of the corners of faces.
+enum class MeshParts : std::uint8_t {
+    all,         ///< position, texture coordinates, normal
+    untextured,  ///< position and normal; PLY alone
+    positions,   ///< nothing else, for flat faces without textures: a third of the size; OBJ alone
 };
 
 class Mesh {
@@ -48,8 +49,11 @@ public:
     void polygon(const std::vector<Vec3>& corners, const Vec3& inside, double metres_per_unit = 1);
 
     [[nodiscard]] std::size_t triangle_count() const { return faces_.size(); }
-    /// Writes `path` (OBJ), which names `mtl_name`. Throws std::runtime_error where it cannot.
-    void write_obj(const std::string& path, const std::string& mtl_name, ObjParts wanted = ObjParts::all) const;
+    /// Both write pairs of triangles that make a convex quadrangle as one face, and throw std::runtime_error where
+    /// they cannot write. An OBJ file names `mtl_name`; a PLY file, binary, has no materials: the scene gives one.
+    /// Numbers are the same, rounded to the same decimals.
+    void write_obj(const std::string& path, const std::string& mtl_name, MeshParts wanted = MeshParts::all) const;
+    void write_ply(const std::string& path, MeshParts wanted = MeshParts::all) const;
 
 private:
     struct Vertex {
@@ -60,6 +64,13 @@ private:
         std::array<std::uint32_t, 3> vertices;
         std::uint16_t part, material;
     };
+    struct Polygon {
+        std::vector<std::uint32_t> vertices;  // three or four
+        std::uint16_t part, material;
+    };
+    [[nodiscard]] bool is_convex(const std::array<std::uint32_t, 4>& quad) const;
+    /// By part, then material.
+    [[nodiscard]] std::vector<Polygon> polygons() const;
     void add_face(std::uint32_t a, std::uint32_t b, std::uint32_t c);
 
     std::vector<std::string> parts_, materials_;

@@ -42,14 +42,12 @@ Mesh build_craft();
 
 /// Extent along x and along y; ground.png covers it once.
 inline constexpr double kTerrainSide = 360;
-std::vector<MaterialSpec> terrain_materials();
 /// An open sheet, facing up.
 Mesh build_terrain();
 
 // --- Small body: a triaxial ellipsoid of 56 x 40 x 34 m with craters of 1 to 18 m and boulders of half a metre to
 // 3 m. Origin in the centre, longest axis x, spin axis z ---
 
-std::vector<MaterialSpec> small_body_materials();
 /// Closed; about 0.4 m between vertices.
 Mesh build_small_body();
 
@@ -66,7 +64,7 @@ Mesh build_tag_board();
 inline constexpr double kLandingReach_m = 2500;
 /// The lander's feet, in its z and from that axis.
 inline constexpr double kLanderFeet_m = -1.3, kLanderFeetRadius_m = 1.6;
-std::vector<MaterialSpec> landing_materials();
+std::vector<MaterialSpec> lander_materials();
 /// An open sheet, facing up.
 Mesh build_landing_site();
 /// The same ground as a map from orbit has it: posts half a metre apart at best, no bump below two metres, heights

@@ -25,7 +25,8 @@ namespace fs = std::filesystem;
 
 const fs::path kDockingScene = std::filesystem::path(test::build_path("scenes/docking"));
 
-/// An OBJ file as written: corners by number of position, so that what meets in space meets here.
+/// An OBJ file as written, faces cut into triangles: corners by number of position, so that what meets in space
+/// meets here.
 struct ObjMesh {
     std::vector<Vec3> positions;
     std::vector<std::array<int, 3>> faces;
@@ -49,11 +50,15 @@ ObjMesh read_obj(const fs::path& path) {
             in >> key;
             mesh.materials.insert(key);
         } else if (key == "f") {
-            std::array<int, 3> face{};
-            std::string corner;
-            for (int& v : face) in >> corner, v = std::atoi(corner.c_str()) - 1;
-            mesh.faces.push_back(face);
-            mesh.face_part.push_back(part);
+            std::vector<int> corners;
+            for (std::string corner; in >> corner;) {
+                const int number = std::atoi(corner.c_str());  // from 1, or back from the newest as -1
+                corners.push_back(number < 0 ? static_cast<int>(mesh.positions.size()) + number : number - 1);
+            }
+            for (std::size_t i = 2; i < corners.size(); ++i) {
+                mesh.faces.push_back({corners[0], corners[i - 1], corners[i]});
+                mesh.face_part.push_back(part);
+            }
         }
     }
     return mesh;

@@ -100,7 +100,7 @@ def write_mesh(path, vertices, faces):
 def render(program, scene, threads):
     """Wall time, CPU time (both s) and memory (MB) of a frame."""
     begin = time.perf_counter()
-    process = subprocess.Popen([program, "render", scene, "--threads", str(threads), "--quiet", "-o", "/dev/shm/narpa-mesh-load.png"],
+    process = subprocess.Popen([program, "render", scene, "--threads", str(threads), "-o", "/dev/shm/narpa-mesh-load.png"],
                                stdout=subprocess.DEVNULL)  # fmt: skip
     _, status, used = os.wait4(process.pid, 0)
     if status:

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -207,10 +208,17 @@ private:
             face_colours_ = colours, faces_have_colours_ = true;
         mark(Columns<3>{list, wedge, e.find({"texnumber"})}), mark(colours.columns());
         note_unused(e);
-        const std::size_t first =
-            can_take && !is_strips ? take_triangles(e, static_cast<std::size_t>(list), colours) : 0;
+        // Where runs of faces with equally many corners are short, all are read one by one.
+        constexpr std::size_t kShortRun = 64;
+        const auto count = static_cast<std::size_t>(e.count);
+        bool may_take = can_take && !is_strips;
         PlyValues v;
-        for (std::size_t i = first; static_cast<double>(i) < e.count; ++i) {
+        for (std::size_t i = 0; i < count; ++i) {
+            if (may_take) {
+                const std::size_t taken = take_faces(e, count - i, static_cast<std::size_t>(list), colours);
+                may_take = taken >= kShortRun;
+                if (i += taken; i == count) break;
+            }
             if (Status read = next(i, v); !read) return read;
             const std::uint32_t colour = colour_of(colours, v);
             const std::vector<double>& corners = v[static_cast<std::size_t>(list)];
@@ -224,50 +232,85 @@ private:
         return Ok{};
     }
 
-    /// Reads faces in parallel, up to the first that is not a triangle of vertices that there are. Returns how
-    /// many.
-    std::size_t take_triangles(const PlyElement& e, std::size_t list, const Colours& colours) {
-        const PlyRows rows = file_.rows(e, 3);
+    /// Reads faces in parallel, from the next one up to the first that has another number of corners than it, or a
+    /// vertex that there is not. Returns how many; none unless the next is a triangle or a quadrangle.
+    std::size_t take_faces(const PlyElement& e, std::size_t left, std::size_t list, const Colours& colours) {
         const PlyProperty& corners = e.properties[list];
-        const auto have = static_cast<double>(soup_.positions.size());
-        TriangleSoup::Triangles& out = soup_.triangles;
-        if (corners.count_type == nullptr || rows.count == 0 || !out.empty()) return 0;
-        out.position.resize(rows.count);
-        std::atomic<std::size_t> end_of_triangles = rows.count;
-        for_parts(rows.count, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                bool is_triangle = rows.value(i, rows.offsets[list], *corners.count_type) == 3;
-                for (std::size_t k = 0; k < 3 && is_triangle; ++k) {
-                    const std::size_t at = rows.offsets[list] + corners.count_type->size + k * corners.type->size;
-                    const double x = rows.value(i, at, *corners.type);
-                    is_triangle = x >= 0 && x < have && x == std::floor(x);
-                    if (is_triangle) out.position[i][k] = static_cast<std::uint32_t>(x);
-                }
-                if (is_triangle) continue;
-                for (std::size_t least = end_of_triangles; i < least;)
-                    if (end_of_triangles.compare_exchange_weak(least, i)) break;
-                return;
+        const PlyRows next = file_.rows(e, 0);
+        if (corners.count_type == nullptr || next.count == 0) return 0;
+        const double length = next.value(0, next.offsets[list], *corners.count_type);
+        if (length != 3 && length != 4) return 0;
+        const auto size = static_cast<std::size_t>(length), triangles = size - 2;
+        PlyRows rows = file_.rows(e, size);
+        rows.count = std::min(rows.count, left);
+        TriangleSoup::Column& out = soup_.triangles.position;
+        const std::size_t from = out.size();
+        out.resize(from + rows.count * triangles);
+        const std::size_t n = count_until_false(rows.count, [&](std::size_t i) {
+            if (rows.value(i, rows.offsets[list], *corners.count_type) != length) return false;
+            std::array<std::uint32_t, 4> vertex{};
+            for (std::size_t k = 0; k < size; ++k) {
+                const std::size_t at = rows.offsets[list] + corners.count_type->size + k * corners.type->size;
+                const double x = rows.value(i, at, *corners.type);
+                if (!is_vertex(x)) return false;
+                vertex[k] = static_cast<std::uint32_t>(x);
             }
+            cut_face(std::span(vertex).first(size), &out[from + i * triangles]);
+            return true;
         });
-        const std::size_t n = end_of_triangles;
-        out.position.resize(n);
-        if (has_vertex_uvs_) out.uv = out.position;
-        if (has_vertex_normals_) out.normal = out.position;
-        if (vertex_colours_.given()) out.colour = out.position;
-        if (colours.given() && faces_have_colours_) take_colours(e, rows, n, colours);
+        out.resize(from + n * triangles);
+        take_attributes(from);
+        if (colours.given() && faces_have_colours_) take_colours(e, rows, n, triangles, colours);
         file_.skip(rows, n);
         return n;
     }
 
-    /// Of the first n faces.
-    void take_colours(const PlyElement& e, const PlyRows& rows, std::size_t n, const Colours& colours) {
-        soup_.triangles.colour.resize(n);
+    /// `out`: room for the triangles.
+    void cut_face(std::span<const std::uint32_t> vertices, std::array<std::uint32_t, 3>* out) const {
+        if (vertices.size() == 3) return void(*out = {vertices[0], vertices[1], vertices[2]});
+        std::array<Vec3, 4> points;
+        for (std::size_t k = 0; k < vertices.size(); ++k) points[k] = soup_.positions[vertices[k]];
+        for (const auto& [a, b, c] : triangulate(points)) *out++ = {vertices[a], vertices[b], vertices[c]};
+    }
+
+    /// The least i for which f(i) is false, or `count`. Calls f in parallel, for all i below that at least.
+    static std::size_t count_until_false(std::size_t count, const auto& f) {
+        std::atomic<std::size_t> end_of_true = count;
+        for_parts(count, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                if (f(i)) continue;
+                for (std::size_t least = end_of_true; i < least;)
+                    if (end_of_true.compare_exchange_weak(least, i)) break;
+                return;
+            }
+        });
+        return end_of_true;
+    }
+
+    /// Of the triangles from `from` on: those of their vertices.
+    void take_attributes(std::size_t from) {
+        const TriangleSoup::Column& position = soup_.triangles.position;
+        const auto copy = [&](TriangleSoup::Column& column) {
+            column.resize(from, kNoIndices);
+            column.insert(column.end(), position.begin() + static_cast<std::ptrdiff_t>(from), position.end());
+        };
+        if (has_vertex_uvs_) copy(soup_.triangles.uv);
+        if (has_vertex_normals_) copy(soup_.triangles.normal);
+        if (vertex_colours_.given()) copy(soup_.triangles.colour);
+    }
+
+    /// Of the newest n faces, each cut into so many triangles.
+    void take_colours(const PlyElement& e, const PlyRows& rows, std::size_t n, std::size_t triangles,
+                      const Colours& colours) {
+        TriangleSoup::Column& column = soup_.triangles.colour;
+        column.resize(soup_.triangles.size() - n * triangles, kNoIndices);
         for (std::size_t i = 0; i < n; ++i) {
             const auto band = [&](std::size_t k) {
                 const auto c = static_cast<std::size_t>(colours.columns()[k]);
                 return static_cast<float>(rows.value(i, rows.offsets[c], *e.properties[c].type));
             };
-            soup_.triangles.colour[i].fill(static_cast<std::uint32_t>(soup_.colours.size()));
+            const auto number = static_cast<std::uint32_t>(soup_.colours.size());
+            column.insert(column.end(), triangles, {number, number, number});
             soup_.colours.push_back({band(0), band(1), band(2)});
         }
     }
@@ -287,10 +330,13 @@ private:
         if (vertex_colours_.given()) c.colour = i;
         return c;
     }
+    [[nodiscard]] bool is_vertex(double i) const {
+        return i >= 0 && i < static_cast<double>(soup_.positions.size()) && i == std::floor(i);
+    }
     Status check(const std::vector<double>& corners) const {
         const auto size = static_cast<double>(soup_.positions.size());
         for (const double i : corners)
-            if (!(i >= 0 && i < size) || i != std::floor(i))
+            if (!is_vertex(i))
                 return file_.error(fmt::format("a face has vertex {}, counted from 0, of {}", i, size));
         if (corners.size() > kMaxCorners)
             return file_.error(
@@ -333,6 +379,9 @@ private:
         }
         return Ok{};
     }
+
+    static constexpr std::array<std::uint32_t, 3> kNoIndices{TriangleSoup::kNone, TriangleSoup::kNone,
+                                                             TriangleSoup::kNone};
 
     PlyFile& file_;
     const std::string& path_;

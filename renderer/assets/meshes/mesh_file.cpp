@@ -99,6 +99,8 @@ Result<MeshFile> read_mesh(const std::string& path, double scale, double crease_
     if (soup->triangles.empty())
         return Error{.what = "no triangles in it, expected a mesh with faces", .file = path};
     const std::size_t given = soup->triangles.size();
+    if (given > kMostTriangles)
+        return Error{.what = fmt::format("{} triangles, expected at most {}", given, kMostTriangles), .file = path};
     if (crease_rad > 0 && soup->normals.empty())
         add_smooth_normals(*soup, crease_rad);
     else if (soup->has_smoothing_groups && crease_rad == 0)

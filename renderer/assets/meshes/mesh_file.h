@@ -12,7 +12,8 @@
 
 namespace narpa {
 
-/// Of narpa-mesh-reader, the process that reads glTF, PLY, STL, 3DS and DAE.
+/// Of narpa-mesh-reader, the process that reads glTF, PLY, STL, 3DS and DAE, for files below 512 MiB; larger ones
+/// have as much again for each further 512 MiB.
 struct MeshReaderLimits {
     std::uint64_t memory_bytes = std::uint64_t{4} << 30;  ///< of the process, and of the data that it sends
     int seconds = 60;                                     ///< wall time

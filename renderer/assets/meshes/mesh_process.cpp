@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstring>
+#include <filesystem>
 #include <utility>
 
 #include "renderer/assets/meshes/mesh_message.h"
@@ -49,6 +50,14 @@ bool indices_are_sound(const TriangleSoup& s) {
            std::ranges::all_of(t.materials, [&](std::uint16_t material) { return material < s.materials.size(); });
 }
 
+/// Larger files take more in proportion.
+MeshReaderLimits scaled_to_size(const MeshReaderLimits& limits, const std::string& path) {
+    constexpr std::uintmax_t kUnit = std::uintmax_t{512} << 20;
+    std::error_code problem;
+    const std::uintmax_t size = std::filesystem::file_size(path, problem), units = problem ? 1 : 1 + size / kUnit;
+    return {.memory_bytes = limits.memory_bytes * units, .seconds = limits.seconds * static_cast<int>(units)};
+}
+
 }  // namespace
 
 bool is_read_in_process(const std::string& extension) {
@@ -56,7 +65,8 @@ bool is_read_in_process(const std::string& extension) {
     return std::find(kAll.begin(), kAll.end(), extension) != kAll.end();
 }
 
-Result<TriangleSoup> read_soup_in_process(const std::string& path, const MeshReaderLimits& limits) {
+Result<TriangleSoup> read_soup_in_process(const std::string& path, const MeshReaderLimits& given) {
+    const MeshReaderLimits limits = scaled_to_size(given, path);
     ReaderProcess process;
     if (const int failed = process.start(
             "narpa-mesh-reader", {path, std::to_string(limits.memory_bytes), std::to_string(limits.seconds)});

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "renderer/geometry/mesh_shape.h"
 
 namespace narpa {
@@ -31,6 +33,24 @@ TEST(IsClosed, AHoleOrATurnedFaceOrNothingIsNot) {
     EXPECT_FALSE(is_closed(hole));
     EXPECT_FALSE(is_closed(turned));
     EXPECT_FALSE(is_closed(Mesh{}));
+}
+
+TEST(IsClosed, LargeOnesToo) {
+    constexpr std::uint32_t kAround = 200;  // a torus of 80,000 triangles
+    Mesh m;
+    for (std::uint32_t i = 0; i < kAround; ++i)
+        for (std::uint32_t j = 0; j < kAround; ++j) {
+            const float a = 0.0314f * static_cast<float>(i), b = 0.0314f * static_cast<float>(j);
+            m.positions.push_back({(3 + std::cos(b)) * std::cos(a), (3 + std::cos(b)) * std::sin(a), std::sin(b)});
+            const auto at = [&](std::uint32_t u, std::uint32_t v) { return u % kAround * kAround + v % kAround; };
+            m.faces.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+            m.faces.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+        }
+    EXPECT_TRUE(is_closed(m));
+    std::swap(m.faces[70'000][0], m.faces[70'000][1]);
+    EXPECT_FALSE(is_closed(m));
+    m.faces.erase(m.faces.begin() + 70'000);
+    EXPECT_FALSE(is_closed(m));
 }
 
 }  // namespace

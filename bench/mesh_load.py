@@ -5,8 +5,8 @@ Usage: bench/mesh_load.py [--program NARPA]... [--threads N] [--format ply|stl|o
 
 Writes spheres with noise of about so many triangles (default 1e4 1e5 1e6 1e7 1.6e7) as binary PLY, binary STL or OBJ into a
 temporary folder, and renders a frame of 64 x 64 pixels of each. With several --program they take turns. Prints the least of the
-rounds: wall time and CPU time of the command, without those of a sphere of 8 triangles, and the largest resident memory, of
-which the reader's process is not a part.
+rounds: wall time and CPU time of the command, without those of a sphere of 8 triangles, and the largest resident memory of one of its
+processes.
 """
 import argparse
 import os

@@ -21,7 +21,7 @@ int ReaderProcess::start(const std::string& program, std::vector<std::string> ar
     std::array<int, 2> ends{};
     if (::pipe2(ends.data(), O_CLOEXEC) != 0) return errno;
     out_ = ends[0];
-    constexpr int kPipeBytes = 1 << 20;  // what Linux lets any user have; with its default of 64 KiB a third slower
+    constexpr int kPipeBytes = 1 << 20;  // what Linux lets any user have; its default is 64 KiB
     ::fcntl(out_, F_SETPIPE_SZ, kPipeBytes);
     arguments.insert(arguments.begin(), program_beside(program));
     std::vector<char*> argv;

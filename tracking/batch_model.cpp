@@ -1,19 +1,18 @@
 #include "tracking/batch_model.h"
 
-#include <variant>
-
 #include "estimator/batch/camera_change.h"
+#include "renderer/scene/own_mesh.h"
 
 namespace narpa {
 namespace {
 
-Status scale_body(double factor, Body& body, Scene& scene) {
-    const int* mesh = std::get_if<int>(&body.shape);
+Status scale_body(double factor, std::size_t index, Scene& scene) {
+    Body& body = scene.bodies[index];
+    Mesh* const mesh = own_mesh(scene, index);
     if (!mesh)
         return Error{"a model error of scale is for a target with a mesh, which body \"" + body.name + "\" is not",
                      scene.file};
-    for (Vec3f& p : scene.meshes[static_cast<std::size_t>(*mesh)].positions)
-        p = vec_cast<float>(factor * vec_cast<double>(p));
+    for (Vec3f& p : mesh->positions) p = vec_cast<float>(factor * vec_cast<double>(p));
     for (Mark& m : body.marks) {
         m.T_body_mark.t = factor * m.T_body_mark.t;
         m.radius_m *= factor, m.side_m *= factor;
@@ -68,8 +67,7 @@ Status displace(const BatchValues& e, BatchUnknown rotation, BatchUnknown shift,
 
 Status apply_model_errors(const BatchValues& e, std::size_t target, Scene& scene) {
     if (at(e, BatchUnknown::scale) != 0)
-        if (Status good = scale_body(1 + at(e, BatchUnknown::scale), scene.bodies[target], scene); !good)
-            return good;
+        if (Status good = scale_body(1 + at(e, BatchUnknown::scale), target, scene); !good) return good;
     brighten(1 + at(e, BatchUnknown::albedo), scene);
     if (Status good = turn_light(at(e, BatchUnknown::light_x), at(e, BatchUnknown::light_y), scene); !good)
         return good;

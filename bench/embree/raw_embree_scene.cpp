@@ -33,7 +33,10 @@ Result<RawScene> RawScene::build(const Scene& scene, const BodyPoses& at) {
             *v++ = vec_cast<float>(at.T_world_body[b] * (mesh.origin_m + vec_cast<double>(p)));
         for (const auto& face : mesh.faces)
             for (const std::uint32_t corner : face) *f++ = first + corner;
-        raw.face_material.insert(raw.face_material.end(), mesh.face_material.begin(), mesh.face_material.end());
+        if (const auto own = scene.bodies[b].mesh_material)
+            raw.face_material.insert(raw.face_material.end(), mesh.faces.size(), static_cast<std::uint16_t>(*own));
+        else
+            raw.face_material.insert(raw.face_material.end(), mesh.face_material.begin(), mesh.face_material.end());
         first += static_cast<std::uint32_t>(mesh.positions.size());
     }
     rtcCommitGeometry(geometry.get());

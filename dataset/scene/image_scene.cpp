@@ -70,6 +70,7 @@ Status show_backdrop(const Backdrop& backdrop, Scene& scene, Roles& roles, std::
 std::set<std::size_t> materials_of(const Scene& scene, const Body& body) {
     if (const auto* shape = std::get_if<ExactShape>(&body.shape))
         return {static_cast<std::size_t>(shape->material)};
+    if (body.mesh_material) return {static_cast<std::size_t>(*body.mesh_material)};
     const Mesh& mesh = scene.meshes[static_cast<std::size_t>(std::get<int>(body.shape))];
     return {mesh.face_material.begin(), mesh.face_material.end()};
 }

@@ -1,4 +1,5 @@
-// The tree of bounding boxes of a mesh: from one box of the whole mesh down to a few thousand leaves.
+// The tree of bounding boxes of a mesh: from one box of the whole mesh down to a few thousand leaves, or two for
+// each triangle.
 #include <algorithm>
 #include <limits>
 #include <queue>
@@ -13,8 +14,9 @@ namespace {
 constexpr std::size_t kBins = 16;
 constexpr float kPieceShare = 1.0f / 160;  ///< root of a piece's largest half surface, of the mesh's extent
 constexpr int kMaxHalvings = 13;           ///< most recursive halvings of a triangle
-constexpr float kMaxPieces = 65536;        ///< approximate limit for pieces of large triangles
-constexpr std::size_t kCells = 256;        ///< of the grid, along the mesh's largest extent
+constexpr std::size_t kLeavesPerFace = 2, kMinLeaves = 32;  ///< a small mesh has fewer leaves than kBoxLeaves
+constexpr std::size_t kPiecesPerLeaf = 16;                  ///< approximate limit for pieces of large triangles
+constexpr std::size_t kCells = 256;                         ///< of the grid, along the mesh's largest extent
 
 struct Box {
     static constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -51,14 +53,15 @@ std::size_t step_at(float x, std::size_t steps) {
 /// whose centres share a cell of a grid, much smaller than the leaves, are merged.
 class Pieces {
 public:
-    explicit Pieces(const Mesh& mesh) {
+    Pieces(const Mesh& mesh, std::size_t leaves) {
         box_of_cell_.reserve(mesh.faces.size());
         for (const auto& f : mesh.faces)
             for (const std::uint32_t vertex : f) all_.add(mesh.positions[vertex]);
         float surfaces = 0;
         for (const auto& f : mesh.faces) surfaces += box_of(corners(mesh, f)).surface();
         const float extent = all_.extent();
-        largest_ = std::max(kPieceShare * extent * kPieceShare * extent, surfaces / kMaxPieces);
+        largest_ = std::max(kPieceShare * extent * kPieceShare * extent,
+                            surfaces / static_cast<float>(kPiecesPerLeaf * leaves));
         cells_per_metre_ = extent > 0 ? kCells / extent : 0;
         for (const auto& f : mesh.faces) cut(corners(mesh, f), kMaxHalvings);
     }
@@ -167,11 +170,12 @@ BoxNode node_about(std::span<const Box> pieces) {
 
 std::vector<BoxNode> box_tree(const Mesh& mesh) {
     if (mesh.faces.empty()) return {};
-    Pieces pieces(mesh);
+    const std::size_t most = std::clamp(kLeavesPerFace * mesh.faces.size(), kMinLeaves, kBoxLeaves);
+    Pieces pieces(mesh, most);
     std::vector<BoxNode> nodes{{pieces.all().low, pieces.all().high}};
     std::priority_queue<Part> to_cut;
     to_cut.push({0, pieces.boxes(), pieces.all().surface()});
-    for (std::size_t leaves = 1; leaves < kBoxLeaves && !to_cut.empty();) {
+    for (std::size_t leaves = 1; leaves < most && !to_cut.empty();) {
         const Part p = to_cut.top();
         to_cut.pop();
         const std::size_t lower = part(p.pieces);

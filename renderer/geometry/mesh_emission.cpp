@@ -12,11 +12,11 @@ namespace {
 /// Each face is chosen in proportion to its area times its radiance.
 class MeshEmission final : public EmissiveSurface {
 public:
-    MeshEmission(const Scene& scene, const Mesh& mesh) : scene_(scene), mesh_(mesh) {
+    MeshEmission(const Scene& scene, const Mesh& mesh, std::optional<int> material) : scene_(scene), mesh_(mesh) {
         double sum = 0;
         for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
             // A texture counts as white, which is its upper bound, so that every emissive face can be chosen.
-            const double radiance = radiance_of(mesh.face_material[f]);
+            const double radiance = radiance_of(material ? *material : mesh.face_material[f]);
             const double area = 0.5 * norm(cross(corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0)));
             if (!(radiance > 0) || !(area > 0)) continue;
             faces_.push_back(f);
@@ -68,8 +68,12 @@ private:
 
 }  // namespace
 
-std::unique_ptr<const EmissiveSurface> mesh_emission(const Scene& scene, const Mesh& mesh) {
-    auto emission = std::make_unique<MeshEmission>(scene, mesh);
+std::unique_ptr<const EmissiveSurface> mesh_emission(const Scene& scene, const Mesh& mesh,
+                                                     std::optional<int> material) {
+    const auto shines = [&](std::size_t m) { return scene.materials[m].emission != Rgb{}; };
+    if (material ? !shines(static_cast<std::size_t>(*material)) : std::ranges::none_of(mesh.face_material, shines))
+        return nullptr;
+    auto emission = std::make_unique<MeshEmission>(scene, mesh, material);
     if (!(emission->properties().power > 0)) return nullptr;
     return emission;
 }

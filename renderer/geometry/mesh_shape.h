@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,8 +26,10 @@ namespace narpa {
 /// ray from outside hits an outer side first. A closed mesh may have several shells.
 [[nodiscard]] bool is_closed(const Mesh& mesh);
 
-/// The emissive faces; null if there are none. Scene and mesh must outlive it.
-[[nodiscard]] std::unique_ptr<const EmissiveSurface> mesh_emission(const Scene& scene, const Mesh& mesh);
+/// The emissive faces; null if there are none. `material`: of all faces, in place of their own. Scene and mesh must
+/// outlive it.
+[[nodiscard]] std::unique_ptr<const EmissiveSurface> mesh_emission(const Scene& scene, const Mesh& mesh,
+                                                                   std::optional<int> material);
 
 class MeshShape final : public Shape {
 public:
@@ -41,6 +44,8 @@ public:
         return trace_shadows(rays, wanted);
     }
     void surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept override;
+    /// The same where all faces have this material of the scene.
+    void surface_of(int material, const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept;
     /// Starts are offset along the normal by the bound of their rounding error in single precision, and kept so far
     /// from the face's edges that the offset does not cross a neighbouring face that meets it at 7 degrees or more.
     void depart(const SurfacePoints& points, std::uint32_t wanted, Vec3Lanes& starts) const noexcept override {
@@ -50,8 +55,9 @@ public:
     [[nodiscard]] Rgb vertex_colour(std::uint32_t face, const Vec3& position_body) const noexcept override;
     [[nodiscard]] std::span<const BoxNode> boxes() const override;
     [[nodiscard]] std::unique_ptr<const EmissiveSurface> emission(const Scene& scene) const override {
-        return mesh_emission(scene, mesh_);
+        return mesh_emission(scene, mesh_, std::nullopt);
     }
+    [[nodiscard]] const Mesh& mesh() const noexcept { return mesh_; }
 
 private:
     MeshShape(const Scene& scene, const Mesh& mesh);
@@ -99,6 +105,7 @@ private:
                                  const Vec3& direction, bool inside) const noexcept;
 
     struct VertexLanes;
+    void finish_surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept;
     void fill_surface(const ShapeHits& found, const VertexLanes& vertex, HitBatch& hits) const noexcept;
 
     const Mesh& mesh_;
@@ -112,6 +119,40 @@ private:
     bool off_centre_ = false;  ///< the sphere about the centre is clearly smaller than the one about the origin
     mutable std::once_flag boxes_made_;
     mutable std::vector<BoxNode> boxes_;
+};
+
+/// A mesh, shared with other bodies, in one material: without the mesh's own materials and colours.
+class MeshInMaterial final : public Shape {
+public:
+    /// `material`: index into Scene::materials.
+    MeshInMaterial(std::shared_ptr<const MeshShape> shape, int material)
+        : shape_(std::move(shape)), material_(material) {
+        properties_ = shape_->properties();
+    }
+
+    std::uint32_t intersect(const ShapeRays& rays, std::uint32_t wanted, ShapeHits& hits) const noexcept override {
+        return shape_->intersect(rays, wanted, hits);
+    }
+    [[nodiscard]] std::uint32_t occluded(const ShapeRays& rays, std::uint32_t wanted) const noexcept override {
+        return shape_->occluded(rays, wanted);
+    }
+    void surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept override {
+        shape_->surface_of(material_, found, wanted, hits);
+    }
+    void depart(const SurfacePoints& points, std::uint32_t wanted, Vec3Lanes& starts) const noexcept override {
+        shape_->depart(points, wanted, starts);
+    }
+    [[nodiscard]] TextureFrame texture_frame(const Hit& hit) const noexcept override {
+        return shape_->texture_frame(hit);
+    }
+    [[nodiscard]] std::span<const BoxNode> boxes() const override { return shape_->boxes(); }
+    [[nodiscard]] std::unique_ptr<const EmissiveSurface> emission(const Scene& scene) const override {
+        return mesh_emission(scene, shape_->mesh(), material_);
+    }
+
+private:
+    std::shared_ptr<const MeshShape> shape_;
+    int material_;
 };
 
 }  // namespace narpa

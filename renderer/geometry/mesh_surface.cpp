@@ -62,14 +62,21 @@ NARPA_EACH_ISA void MeshShape::fill_surface(const ShapeHits& found, const Vertex
 }
 
 void MeshShape::surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept {
+    for_each_lane(wanted, [&](std::size_t i) { hits.material[i] = mesh_.face_material[found.face[i]]; });
+    finish_surface(found, wanted, hits);
+}
+
+void MeshShape::surface_of(int material, const ShapeHits& found, std::uint32_t wanted,
+                           HitBatch& hits) const noexcept {
+    hits.material.fill(material);
+    finish_surface(found, wanted, hits);
+}
+
+/// Everything but the materials, which are set.
+void MeshShape::finish_surface(const ShapeHits& found, std::uint32_t wanted, HitBatch& hits) const noexcept {
     VertexLanes vertex;
-    const auto textured = [&](std::size_t i) {
-        return !textured_.empty() && textured_[static_cast<std::size_t>(hits.material[i])] != 0;
-    };
-    for_each_lane(wanted, [&](std::size_t i) {
-        hits.material[i] = mesh_.face_material[found.face[i]];
-        vertex.textured |= textured(i);
-    });
+    const auto textured = [&](std::size_t i) { return textured_[static_cast<std::size_t>(hits.material[i])] != 0; };
+    if (!textured_.empty()) for_each_lane(wanted, [&](std::size_t i) { vertex.textured |= textured(i); });
     if (!mesh_.normals.empty())
         for_each_lane(wanted, [&](std::size_t i) {
             const auto& corner = mesh_.faces[found.face[i]];

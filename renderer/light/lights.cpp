@@ -83,13 +83,14 @@ void Lights::add_light(std::size_t index) {
 }
 
 void Lights::add_body(std::size_t index, const Shape& shape) {
-    auto surface = shape.emission(*scene_);
+    const auto [known, is_new] = surfaces_.try_emplace(&shape);
+    if (is_new) known->second = shape.emission(*scene_);
+    const EmissiveSurface* const surface = known->second.get();
     if (surface == nullptr || !(surface->properties().power > 0)) return;
     const auto& [centre, radius_m, power] = surface->properties();
     const int body = static_cast<int>(index);
     emitter_of_body_[index] = static_cast<int>(emitters_.size());
-    emitters_.push_back({-1, body, surface.get(), body, centre, radius_m, power});
-    surfaces_.push_back(std::move(surface));
+    emitters_.push_back({-1, body, surface, body, centre, radius_m, power});
 }
 
 std::span<const Lights::Emitter> Lights::emitters(Group group) const noexcept {

@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "renderer/geometry/tracer.h"
@@ -102,8 +103,8 @@ private:
     std::vector<Emitter> emitters_;  ///< the lights, then the bodies
     std::size_t lights_ = 0;
     bool any_with_extent_ = false;
-    std::vector<int> emitter_of_body_;  ///< -1: none
-    std::vector<std::unique_ptr<const EmissiveSurface>> surfaces_;
+    std::vector<int> emitter_of_body_;                                                   ///< -1: none
+    std::unordered_map<const Shape*, std::unique_ptr<const EmissiveSurface>> surfaces_;  ///< null: none
 };
 
 }  // namespace narpa

@@ -50,6 +50,7 @@ struct ExactShape {
 struct Body {
     std::string name;
     std::variant<int, ExactShape> shape;     ///< index into Scene::meshes, or an exact shape
+    std::optional<int> mesh_material{};      ///< of all faces of its mesh, in place of the mesh's own; index
     Motion initial{};                        ///< at time 0
     std::shared_ptr<const Course> course{};  ///< null: constant velocity and rate from `initial`
     std::optional<std::uint32_t> can_id{};   ///< base identifier of its pose commands on CAN

@@ -50,10 +50,13 @@ public:
             Result<MeshFile> file = read_mesh(named.path, named.scale, named.crease_rad);
             if (!file) return blame(named, file.error());
             r_.scene.warnings.insert(r_.scene.warnings.end(), file->warnings.begin(), file->warnings.end());
-            known = meshes_.emplace(key, std::move(*file)).first;
+            known = meshes_.emplace(key, add_mesh(*std::move(file))).first;
         }
-        r_.scene.bodies[named.body].shape = named.material ? add_mesh(known->second.mesh, *named.material)
-                                                           : mesh_with_own_materials(key, known->second);
+        LoadedMesh& mesh = known->second;
+        Body& body = r_.scene.bodies[named.body];
+        body.shape = mesh.index;
+        body.mesh_material = named.material;
+        if (!named.material) use_own_materials(mesh, named.scale);
     }
 
     void load_texture(const NamedTexture& named) {
@@ -65,6 +68,13 @@ public:
 private:
     using Colour = TextureUse::Colour;
     using MeshKey = std::tuple<std::string, double, double>;
+    /// A mesh of the scene, and what only bodies without a material of their own need; empty once it is used.
+    struct LoadedMesh {
+        int index = 0;
+        std::vector<std::uint16_t> face_material{};  ///< index into `materials`
+        std::vector<Rgb> colours{};
+        std::vector<MeshMaterial> materials{};
+    };
     using TextureKey = std::tuple<std::string, Colour, Texture::Wrap>;
 
     static TextureKey texture_key(const MeshTexture& texture, const TextureUse& use) {
@@ -80,25 +90,27 @@ private:
         r_.problems.add(named.place, std::move(error));
     }
 
-    int add_mesh(Mesh mesh, int material) {
-        mesh.face_material.assign(mesh.faces.size(), static_cast<std::uint16_t>(material));
-        mesh.colours = {};
-        r_.scene.meshes.push_back(std::move(mesh));
-        return static_cast<int>(r_.scene.meshes.size()) - 1;
+    LoadedMesh add_mesh(MeshFile file) {
+        LoadedMesh loaded{static_cast<int>(r_.scene.meshes.size()), std::move(file.mesh.face_material),
+                          std::move(file.mesh.colours), std::move(file.materials)};
+        file.mesh.face_material.assign(file.mesh.faces.size(), 0);
+        file.mesh.colours = {};
+        r_.scene.meshes.push_back(std::move(file.mesh));
+        return loaded;
     }
 
-    int mesh_with_own_materials(const MeshKey& key, const MeshFile& file) {
-        const auto known = plain_.find(key);
-        if (known != plain_.end()) return known->second;
-        Mesh mesh = file.mesh;
+    /// Adds the materials of a mesh file to the scene when the first body wants them.
+    void use_own_materials(LoadedMesh& loaded, double scale) {
+        if (loaded.face_material.empty()) return;
         std::map<std::uint16_t, std::uint16_t> scene_material;  // of materials that some face has
-        for (std::uint16_t& m : mesh.face_material) {
+        for (std::uint16_t& m : loaded.face_material) {
             auto [it, is_new] = scene_material.try_emplace(m);
-            if (is_new) it->second = add_material(file.materials[m], std::get<1>(key));
+            if (is_new) it->second = add_material(loaded.materials[m], scale);
             m = it->second;
         }
-        r_.scene.meshes.push_back(std::move(mesh));
-        return plain_[key] = static_cast<int>(r_.scene.meshes.size()) - 1;
+        Mesh& mesh = r_.scene.meshes[static_cast<std::size_t>(loaded.index)];
+        mesh.face_material = std::exchange(loaded.face_material, {});
+        mesh.colours = std::exchange(loaded.colours, {});
     }
 
     /// `scale`: metres per unit of the mesh file.
@@ -196,8 +208,7 @@ private:
     }
 
     SceneReading& r_;
-    std::map<MeshKey, MeshFile> meshes_;
-    std::map<MeshKey, int> plain_;  ///< with the materials of the file
+    std::map<MeshKey, LoadedMesh> meshes_;
     std::map<TextureKey, int> textures_;
     std::set<std::string> heights_;  ///< images under MTL's `bump` that are no normal maps
 };

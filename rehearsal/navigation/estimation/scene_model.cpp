@@ -1,8 +1,8 @@
 #include "rehearsal/navigation/estimation/scene_model.h"
 
 #include <algorithm>
-#include <variant>
 
+#include "renderer/scene/own_mesh.h"
 #include "renderer/scene_file/scene_file.h"
 
 namespace narpa::rehearsal {
@@ -12,8 +12,8 @@ namespace {
 void apply_model_error(const ModelUncertainty& e, std::size_t target, Scene& scene) {
     if (e == ModelUncertainty{}) return;
     const Vec3 along = normalized(Vec3{1, 1, 1});
-    if (const int* mesh = std::get_if<int>(&scene.bodies[target].shape))
-        for (Vec3f& p : scene.meshes[static_cast<std::size_t>(*mesh)].positions)
+    if (Mesh* const mesh = own_mesh(scene, target))
+        for (Vec3f& p : mesh->positions)
             p = vec_cast<float>((1 + e.scale) * vec_cast<double>(p) + e.mesh_m * along);
     for (Material& m : scene.materials) m.diffuse = static_cast<float>(1 + e.albedo) * m.diffuse;
     if (scene.sun) scene.sun->direction = exp_rotation(e.light_rad * along) * scene.sun->direction;

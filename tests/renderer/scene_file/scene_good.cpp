@@ -112,8 +112,8 @@ TEST(SceneFile, ReadsBodiesAndTheirMaterials) {
     EXPECT_FLOAT_EQ(s.materials[static_cast<std::size_t>(moon.material)].diffuse.x, 0.12f);
     EXPECT_EQ(semi_axes_m(s.bodies[3]), (Vec3{13000, 11400, 9100}));
 
-    const Mesh& overridden = s.meshes[static_cast<std::size_t>(std::get<int>(s.bodies[1].shape))];
-    const Material& phong = s.materials[overridden.face_material.front()];
+    ASSERT_TRUE(s.bodies[1].mesh_material);
+    const Material& phong = s.materials[static_cast<std::size_t>(*s.bodies[1].mesh_material)];
     EXPECT_EQ(phong.kind, &kinds::phong);
     EXPECT_EQ(phong.specular, (Rgb{0.3f, 0.3f, 0.3f}));
     EXPECT_EQ(phong.exponent, 40);
@@ -328,6 +328,31 @@ TEST(SceneFile, OneMeshFileOfTwoBodiesIsReadOnce) {
     EXPECT_EQ(s.meshes.size(), 2u);
     EXPECT_EQ(std::get<int>(s.bodies[0].shape), std::get<int>(s.bodies[1].shape));
     EXPECT_EQ(s.meshes[static_cast<std::size_t>(std::get<int>(s.bodies[2].shape))].positions[1].x, 3);
+}
+
+TEST(SceneFile, BodiesOfOtherMaterialsShareTheirMesh) {
+    const MemoryFolder folder;
+    folder.write("t.mtl", "newmtl a\nKd 0.1 0.2 0.3\nnewmtl b\nKd 0.4 0.5 0.6\n");
+    folder.write("t.obj",
+                 "mtllib t.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 2 4 3\n");
+    const std::string body = "[[body]]\nmesh = \"t.obj\"\n", grey = "material = {kind = \"lambert\", albedo = 0.";
+    const std::string given = body + "name = \"x\"\n" + grey + "8}\n" + body + "name = \"y\"\n" + grey + "9}\n";
+    const auto read = [&](const std::string& bodies) {
+        return read_good(folder.write("s.toml", "[ambient]\nradiance = 1\n" + bodies + kCamera));
+    };
+    const Scene two = read(given);
+    EXPECT_EQ(two.meshes.size(), 1u);
+    EXPECT_EQ(two.materials.size(), 2u) << "not those of the file, which nothing shows";
+    EXPECT_EQ(two.bodies[0].mesh_material, 0);
+    EXPECT_EQ(two.bodies[1].mesh_material, 1);
+
+    const Scene three = read(given + body + "name = \"own\"\n");
+    ASSERT_EQ(three.meshes.size(), 1u);
+    EXPECT_FALSE(three.bodies[2].mesh_material);
+    const Mesh& mesh = three.meshes[0];
+    ASSERT_EQ(mesh.face_material.size(), 2u);
+    EXPECT_FLOAT_EQ(three.materials.at(mesh.face_material[0]).diffuse.x, 0.1f);
+    EXPECT_FLOAT_EQ(three.materials.at(mesh.face_material[1]).diffuse.x, 0.4f);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cassert>
+#include <unordered_map>
 #include <utility>
 
 #include "protocols/video/embedded_line.h"
@@ -88,12 +89,14 @@ Status World::load(const std::vector<TrajectoryRow>& rows, std::int64_t t_from_n
         is_new[body] = true;
         return tracks_[body]->push({0, row.t_ns, row.motion}, t_from_ns) == TrackStatus::taken;
     };
+    std::unordered_map<std::string_view, std::size_t> index;
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) index.emplace(scene_.bodies[i].name, i);
     for (const TrajectoryRow& row : rows) {
-        const auto body = body_named(row.body);
-        if (!body)
+        const auto body = index.find(row.body);
+        if (body == index.end())
             return Error{"the trajectory names a body \"" + row.body + "\" that the scene does not have",
                          scene_.file};
-        const std::size_t i = *body;
+        const std::size_t i = body->second;
         if (row.t_ns <= t_from_ns) {
             before[i] = &row;
         } else if (!past_end[i]) {
@@ -130,6 +133,7 @@ PlacementSource World::place(std::int64_t t_ns, int rider, BodyPoses& out,
             named = true;
         }
     }
+    tracer().arrange(out);
     return source;
 }
 
@@ -137,6 +141,7 @@ void World::place_moving(std::int64_t start_ns, std::int64_t end_ns, BodyPoses& 
     assert(start_ns <= end_ns);
     for (const std::size_t i : moving_)
         out.set(i, pose(i, start_ns).motion.T_world_body, pose(i, end_ns).motion.T_world_body);
+    tracer().arrange(out);
 }
 
 std::optional<std::size_t> World::body_named(std::string_view name) const noexcept {

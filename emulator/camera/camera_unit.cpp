@@ -121,6 +121,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
         world_.place(end_ns, camera_.mount, placement_, ends_);
         for (std::size_t i = 0; i < starts_.size(); ++i)
             placement_.set(i, starts_[i].T_world_body, ends_[i].T_world_body);
+        world_.tracer().arrange(placement_);
     }
     const CameraPose pose = camera_pose(world_, camera_, placement_, start_ns, end_ns, motions_);
     const std::int64_t begun_ns = monotonic_ns();

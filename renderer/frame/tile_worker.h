@@ -287,7 +287,8 @@ template <class Tile>
 void add_subpixel_light(const Frame& f, const Tile& t, RadianceImage& out, std::vector<float>* variance) {
     if (!f.subpixel_bodies.any()) return;
     for (int y = 0; y < t.height; y += kBlock)
-        for (int x = 0; x < t.width; x += kBlock) add_subpixel_bodies(f, block_of(t, x, y), out, variance);
+        for (int x = 0; x < t.width; x += kBlock)
+            add_subpixel_bodies(f, block_of(t, x, y), t.bodies, out, variance);
 }
 
 /// Adds the variance of each pixel's mean to `variance`: that of independent samples, block by block, times the

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/pose.h"
+#include "renderer/geometry/body_tree.h"
 
 namespace narpa {
 
@@ -13,7 +14,7 @@ inline constexpr double kMidExposure = 0.5;
 /// Reused from frame to frame: no allocation after construction.
 class BodyPoses {
 public:
-    explicit BodyPoses(std::size_t bodies) : T_world_body(bodies), paths_(bodies) {}
+    explicit BodyPoses(std::size_t bodies) : T_world_body(bodies), paths_(bodies), tree_(bodies) {}
 
     /// The body stands still during the exposure.
     void set(std::size_t body, const Rigid3& T) noexcept { set(body, T, T); }
@@ -35,6 +36,10 @@ public:
 
     std::vector<Rigid3> T_world_body;  ///< at mid-exposure; changed by `set`
 
+    /// Of Tracer::arrange; cleared by `set`.
+    [[nodiscard]] BodyTree& tree() noexcept { return tree_; }
+    [[nodiscard]] const BodyTree& tree() const noexcept { return tree_; }
+
 private:
     struct Path {
         Rigid3 start, end;
@@ -50,6 +55,7 @@ private:
 
     std::vector<Path> paths_;
     std::size_t moving_ = 0;  ///< bodies that move
+    BodyTree tree_;
 };
 
 inline void BodyPoses::set(std::size_t body, const Rigid3& start, const Rigid3& end) noexcept {
@@ -58,6 +64,7 @@ inline void BodyPoses::set(std::size_t body, const Rigid3& start, const Rigid3& 
     path = {start, end, !(start == end)};
     moving_ += path.moves ? 1 : 0;
     T_world_body[body] = path.moves ? path.pose_at(kMidExposure) : start;
+    tree_.clear();
 }
 
 }  // namespace narpa

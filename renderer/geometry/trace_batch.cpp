@@ -2,43 +2,15 @@
 // evaluates the surfaces at the hits.
 #include <algorithm>
 #include <array>
-#include <bit>
 
 #include "base/constants.h"
 #include "base/each_isa.h"
 #include "renderer/geometry/poses_at.h"
 #include "renderer/geometry/sphere_roots.h"
 #include "renderer/geometry/tracer_impl.h"
+#include "renderer/geometry/world_rays.h"
 
 namespace narpa {
-
-/// Rays in world axes. Their starts are stored in two parts, as the sum would be rounded. All lanes are finite,
-/// also inactive ones.
-struct WorldRays {
-    bool coherent;
-    const Vec3Lanes& direction;
-    const Vec3Lanes& base;    ///< world: the ray's origin, or that of the body that it leaves
-    const Vec3Lanes& offset;  ///< from there to the start
-    const Lanes<double>& time;
-    bool same_time;                        ///< all have the same time
-    const Lanes<int>* own = nullptr;       ///< the bodies that they leave; null: none
-    const Vec3Lanes* own_start = nullptr;  ///< in the frame of that body
-    std::uint32_t inside = 0;              ///< those that leave an inner side
-
-    /// Origin relative to a body at `t`. Positions are subtracted first, so that a common offset of the whole scene
-    /// cancels.
-    [[nodiscard]] Vec3 origin_from(const Vec3& t, std::size_t i) const { return offset[i] + (base[i] - t); }
-    [[nodiscard]] std::uint32_t that_leave(std::uint32_t body) const {
-        return own == nullptr ? 0 : lanes_with(*own, static_cast<int>(body));
-    }
-};
-
-/// The nearest hit of each ray so far.
-struct NearestHits {
-    std::uint32_t met = 0;
-    Lanes<int> body;  ///< -1: none
-    ShapeHits at;     ///< infinite range: none
-};
 
 namespace {
 
@@ -57,28 +29,6 @@ bool is_one_moment(const Lanes<double>& time) {
     for (std::size_t i = 0; i < kLanes; ++i) other |= static_cast<int>(time[i] != time[0]);
     return other == 0;
 }
-
-/// Groups lanes by body.
-class BodyGroups {
-public:
-    struct Group {
-        std::size_t body;
-        std::uint32_t lanes;
-    };
-    BodyGroups(const Lanes<int>& body, std::uint32_t lanes) noexcept {
-        for (std::uint32_t rest = lanes; rest != 0;
-             rest &= ~groups_[n_++].lanes) {  // NOLINT(bugprone-infinite-loop)
-            const int first = body[static_cast<std::size_t>(std::countr_zero(rest))];
-            groups_[n_] = {static_cast<std::size_t>(first), lanes_with(body, first) & rest};
-        }
-    }
-    [[nodiscard]] const Group* begin() const { return groups_.data(); }
-    [[nodiscard]] const Group* end() const { return groups_.data() + n_; }
-
-private:
-    Lanes<Group> groups_;
-    std::size_t n_ = 0;
-};
 
 /// Where each ray enters the bounds of a body at `t`; infinity where it misses them. The rays that `leave` the body
 /// start inside.
@@ -175,12 +125,6 @@ NARPA_EACH_ISA void start_rays(const PoseLanes& T_world_body, const SurfacePoint
         direction.put(i, choose(mine[i] != 0, directions[i], {0, 0, 1}));
         time[i] = choose(mine[i] != 0, from.time[i], kMidExposure);
     }
-}
-
-std::uint32_t lanes_before(const Lanes<double>& entry_m, const Lanes<double>& end_m) {
-    Lanes<int> before;
-    for (std::size_t i = 0; i < kLanes; ++i) before[i] = -static_cast<int>(entry_m[i] < end_m[i]);
-    return bits_of(before);
 }
 
 /// Transforms surfaces from the body's frame to the world. The pose is copied, as for the compiler the stores might
@@ -285,6 +229,13 @@ NARPA_EACH_ISA void Tracer::Impl::trace_body(const BodyPoses& at, const WorldRay
     nearest.met |= met;
 }
 
+NARPA_EACH_ISA std::uint32_t Tracer::Impl::occluded_by(const BodyPoses& at, const WorldRays& rays,
+                                                       std::uint32_t body, std::uint32_t entering,
+                                                       ShapeRays& local) const noexcept {
+    to_body(at, body, rays, rays.that_leave(body), local);
+    return shapes[body]->occluded(local, entering);
+}
+
 void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::uint32_t body,
                               Lanes<double>& entry_m) const noexcept {
     const std::uint32_t leave = rays.that_leave(body);
@@ -301,10 +252,10 @@ void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::u
 NARPA_EACH_ISA void Tracer::Impl::find_nearest(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted,
                                                std::span<const std::uint32_t> bodies,
                                                NearestHits& nearest) const noexcept {
-    nearest.met = nearest.at.inner = 0;
-    nearest.body.fill(-1);
-    nearest.at.range_m = kNoEnd;
+    nearest.clear();
     ShapeRays local;
+    if (in_tree(at) && bodies.size() == all_bodies.size())
+        return find_nearest_in_tree(at, rays, wanted, kNoBody, nearest);
     if (bodies.size() == 1) {
         enter_body(at, rays, bodies[0], local.entry_m);
         const std::uint32_t entering = lanes_before(local.entry_m, nearest.at.range_m) & wanted;
@@ -352,6 +303,7 @@ NARPA_EACH_ISA std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, co
     std::uint32_t dark = is_one ? leaving.occluded_by(own, t_max, coherent) : 0;
     if (dark == wanted || (is_one && all_bodies.size() == 1)) return dark;
     const WorldRays rays = leaving.in_world(coherent);
+    if (in_tree(at)) return dark | find_occluded_in_tree(at, rays, t_max, own, wanted & ~dark);
     ShapeRays local;
     local.t_max = t_max;
     for (const std::uint32_t body : all_bodies) {
@@ -359,9 +311,7 @@ NARPA_EACH_ISA std::uint32_t Tracer::Impl::find_occluded(const BodyPoses& at, co
         if (dark == wanted) break;
         enter_body(at, rays, body, local.entry_m);
         const std::uint32_t entering = lanes_before(local.entry_m, t_max) & wanted & ~dark;
-        if (entering == 0) continue;
-        to_body(at, body, rays, rays.that_leave(body), local);
-        dark |= shapes[body]->occluded(local, entering);
+        if (entering != 0) dark |= occluded_by(at, rays, body, entering, local);
     }
     return dark;
 }

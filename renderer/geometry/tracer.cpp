@@ -1,11 +1,16 @@
 #include "renderer/geometry/tracer.h"
 
+#include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "renderer/geometry/tracer_impl.h"
 
 namespace narpa {
 namespace {
+
+/// Of a position, relative: bound of its rounding error on the way between two others.
+constexpr double kMovingMargin = 1e-15;
 
 Status check_textures(const Scene& s, const Material& m) {
     for (const int texture :
@@ -33,6 +38,13 @@ Status Tracer::Impl::build(const Scene& s, int threads) {
     shapes = *std::move(made);
     all_bodies.resize(shapes.size());
     std::iota(all_bodies.begin(), all_bodies.end(), 0u);
+    largest_bodies = all_bodies;
+    if (shapes.size() > BodyTree::kFewBodies) {
+        const auto minus_radius_m = [&](std::uint32_t body) { return -shapes[body]->properties().radius_m; };
+        std::ranges::stable_sort(largest_bodies, {}, minus_radius_m);
+        largest_bodies.resize(BodyTree::kFewBodies);
+        std::ranges::sort(largest_bodies);
+    }
     for (const Material& m : s.materials)
         if (const Status good = check_textures(s, m); !good) return good.error();
     return Ok{};
@@ -58,6 +70,10 @@ Hit Tracer::intersect(const BodyPoses& at, const Ray& ray, double t_max, int ski
         intersect(at, rays, bodies, hits);
         if (hits.met != 0 && hits.range_m[0] < t_max) nearest = hits[0], t_max = nearest.range_m;
     };
+    if (skip_body >= 0 && impl_->in_tree(at)) {
+        const Hit hit = impl_->intersect_others(at, ray, static_cast<std::uint32_t>(skip_body));
+        return hit.body >= 0 && hit.range_m < t_max ? hit : Hit{};
+    }
     const std::size_t skip = skip_body < 0 ? all_bodies().size() : static_cast<std::size_t>(skip_body);
     try_bodies(all_bodies().first(skip));
     if (skip < all_bodies().size()) try_bodies(all_bodies().subspan(skip + 1));
@@ -72,6 +88,22 @@ bool Tracer::occluded(const BodyPoses& at, const Hit& from, const Vec3& directio
     Lanes<double> ends;
     ends.fill(t_max);
     return occluded(at, points, directions, ends, 1u) != 0;
+}
+
+void Tracer::arrange(BodyPoses& at) const noexcept {
+    const std::span<BodyTree::Sphere> spheres = at.tree().spheres();
+    for (std::size_t body = 0; body < spheres.size(); ++body) {
+        const auto& [radius_m, bound_m] = std::pair(bounding_radius_m(body), shape(body).properties().bound_m);
+        const Vec3 start = at.position_at(body, 0), end = at.position_at(body, 1);
+        const double rounding_m = at.moves(body) ? kMovingMargin * (norm(start) + norm(end)) : 0;
+        spheres[body] = {start + 0.5 * (end - start),
+                         std::max(radius_m, bound_m) + 0.5 * norm(end - start) + rounding_m};
+    }
+    at.tree().build(impl_.get());
+}
+
+const BodyTree* Tracer::tree(const BodyPoses& at) const noexcept {
+    return impl_->in_tree(at) ? &at.tree() : nullptr;
 }
 
 TextureFrame Tracer::texture_frame(const BodyPoses& at, const Hit& hit) const noexcept {
@@ -93,6 +125,10 @@ const Shape& Tracer::shape(std::size_t body) const noexcept {
 
 std::span<const std::uint32_t> Tracer::all_bodies() const noexcept {
     return impl_->all_bodies;
+}
+
+std::span<const std::uint32_t> Tracer::largest_bodies() const noexcept {
+    return impl_->largest_bodies;
 }
 
 std::size_t Tracer::triangle_count() const noexcept {

@@ -4,6 +4,9 @@
 /// advanced to the body's bounding sphere, and its range stays double: an error of 0.3 um at any distance, where
 /// Embree's own instances (float) are off by 0.2 m at 6778 km. Bodies move by other BodyPoses; nothing is rebuilt.
 ///
+/// Rays among many bodies find them in a tree over their bounding spheres (BodyTree), in double as well, if the
+/// poses were arranged; a few are tried one by one.
+///
 /// All queries are thread-safe and allocate nothing.
 #pragma once
 
@@ -27,6 +30,12 @@ public:
     Tracer(Tracer&&) noexcept;
     Tracer& operator=(Tracer&&) noexcept;
     ~Tracer();
+
+    /// Builds the tree of these poses, where there are more than BodyTree::kFewBodies. Without it, and after a
+    /// change of the poses, all queries find the same, in a time proportional to the number of bodies.
+    void arrange(BodyPoses& at) const noexcept;
+    /// The tree, if these poses were arranged; else null.
+    [[nodiscard]] const BodyTree* tree(const BodyPoses& at) const noexcept;
 
     /// Nearest hits with 0 <= range, of rays that run close together, as those of neighbouring pixels or of a
     /// LiDAR's firing do; they may start anywhere. Only these `bodies` are tried: those that the rays may hit.
@@ -73,6 +82,8 @@ public:
     }
     /// The indices of all bodies: for rays that may hit any body.
     [[nodiscard]] std::span<const std::uint32_t> all_bodies() const noexcept;
+    /// The indices of the BodyTree::kFewBodies bodies with the largest bounding spheres, or of all; ascending.
+    [[nodiscard]] std::span<const std::uint32_t> largest_bodies() const noexcept;
     [[nodiscard]] std::size_t triangle_count() const noexcept;
     [[nodiscard]] const Scene& scene() const noexcept;
 

@@ -17,13 +17,17 @@ using Shapes = std::vector<std::shared_ptr<const Shape>>;
 struct WorldRays;
 struct NearestHits;
 
+inline constexpr std::uint32_t kNoBody = ~0u;
+
 struct Tracer::Impl {
     const Scene* scene = nullptr;
     embree::Owned<RTCDevice> device;  // outlives the shapes
     Shapes shapes;                    ///< one for each body
-    std::vector<std::uint32_t> all_bodies;
+    std::vector<std::uint32_t> all_bodies, largest_bodies;
 
     Status build(const Scene& s, int threads);
+
+    [[nodiscard]] bool in_tree(const BodyPoses& at) const noexcept { return at.tree().belongs_to(this); }
 
     class SecondaryRays;
     /// Nearest hits of the `wanted` lanes among these bodies.
@@ -38,6 +42,18 @@ struct Tracer::Impl {
     [[nodiscard]] std::uint32_t find_occluded(const BodyPoses& at, const SurfacePoints& from,
                                               const Vec3Lanes& directions, const Lanes<double>& t_max,
                                               std::uint32_t wanted, bool coherent) const noexcept;
+    // The same for all bodies, where the poses have a tree (trace_tree.cpp).
+    /// `skip`: a body to leave out; kNoBody: none.
+    void find_nearest_in_tree(const BodyPoses& at, const WorldRays& rays, std::uint32_t wanted, std::uint32_t skip,
+                              NearestHits& nearest) const noexcept;
+    /// `done`: a body that is known not to occlude rays that leave it.
+    [[nodiscard]] std::uint32_t find_occluded_in_tree(const BodyPoses& at, const WorldRays& rays,
+                                                      const Lanes<double>& t_max, std::size_t done,
+                                                      std::uint32_t wanted) const noexcept;
+    [[nodiscard]] Hit intersect_others(const BodyPoses& at, const Ray& ray, std::uint32_t skip) const noexcept;
+    /// The `wanted` lanes that meet a body before `t_max`.
+    [[nodiscard]] std::uint32_t occluded_by(const BodyPoses& at, const WorldRays& rays, std::uint32_t body,
+                                            std::uint32_t wanted, ShapeRays& local) const noexcept;
     /// The surfaces at the nearest hits, in the world.
     void finish(const BodyPoses& at, const WorldRays& rays, const NearestHits& nearest,
                 HitBatch& hits) const noexcept;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <unordered_map>
 
 #include "base/each_isa.h"
 #include "renderer/geometry/poses_at.h"
@@ -48,6 +49,27 @@ NARPA_EACH_ISA void find_meeting_body(const RayBatch& beams, const PoseLanes& T_
         const bool inside = c <= 0, ahead = (ov < 0) & (ov * ov >= (1 - 1e-9) * vv * c);
         meeting[i] = -static_cast<int>(near & within & (inside | ahead));
     }
+}
+
+/// The beams that may come near a sphere of the tree over bodies.
+NARPA_EACH_ISA void find_near_sphere(const RayBatch& beams, const BodyTree::Sphere& sphere, double half_tangent,
+                                     double beam_end_m, Lanes<int>& __restrict meeting) {
+    const double radius_m = sphere.radius_m, tangent = half_tangent, end_m = beam_end_m;
+    const Vec3 centre = sphere.centre;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Vec3 to = centre - beams.origin[i], d = beams.direction[i];
+        const double along_m = dot(to, d), to_m = norm(to);
+        const Vec3 aside = to - along_m * d;
+        const double reach_m = radius_m + tangent * (to_m + radius_m) + double{kBeamSlack} * (to_m + radius_m);
+        const bool near = (to_m <= reach_m) | ((along_m >= 0) & (dot(aside, aside) <= reach_m * reach_m));
+        meeting[i] = -static_cast<int>(near & (to_m - reach_m <= end_m));
+    }
+}
+
+std::uint32_t near_sphere(const RayBatch& beams, const BodyTree::Sphere& sphere, double tangent, double end_m) {
+    Lanes<int> meeting;
+    find_near_sphere(beams, sphere, tangent, end_m, meeting);
+    return bits_of(meeting);
 }
 
 /// Beams in the frame of a body.
@@ -169,46 +191,66 @@ std::vector<BeamBox> beam_boxes(std::span<const BoxNode> nodes, std::size_t most
 BeamCulling::BeamCulling(const Tracer& tracer, double tangent, double range_max_m)
     : tracer_(tracer), tangent_(tangent), range_max_m_(range_max_m) {
     const std::size_t most = tangent > 0 ? kMaxBoxes : kMaxForRays;
+    std::unordered_map<const Shape*, std::size_t> known;
     for (const std::uint32_t body : tracer.all_bodies()) {
-        const auto same = std::ranges::find(shapes_, &tracer.shape(body), &BoxedShape::shape);
-        shape_of_body_.push_back(static_cast<std::size_t>(same - shapes_.begin()));
-        if (same == shapes_.end())
-            shapes_.push_back({&tracer.shape(body), beam_boxes(tracer.shape(body).boxes(), most)});
+        const Shape& shape = tracer.shape(body);
+        const auto [index, is_new] = known.try_emplace(&shape, shapes_.size());
+        if (is_new) shapes_.push_back({&shape, beam_boxes(shape.boxes(), most)});
+        shape_of_body_.push_back(index->second);
     }
-    meeting_.resize(shape_of_body_.size());
+    meetings_.resize(shape_of_body_.size());
     bodies_.resize(shape_of_body_.size());
 }
 
-std::uint32_t BeamCulling::find_meeting(const BodyPoses& at, const RayBatch& beams) noexcept {
+std::uint32_t BeamCulling::meeting(const BodyPoses& at, const RayBatch& beams, std::size_t body) const noexcept {
     const std::uint32_t wanted = lanes_below(beams.n);
+    PoseLanes T_world_body;
+    poses_at(at, body, beams.time, T_world_body);
+    const std::span<const BeamBox> boxes = shapes_[shape_of_body_[body]].boxes;
+    const double radius_m = tracer_.bounding_radius_m(body);
+    if (boxes.empty()) {
+        Lanes<int> meeting;
+        find_meeting_body(beams, T_world_body, radius_m, tracer_.bounds(body), tangent_, range_max_m_, meeting);
+        return bits_of(meeting) & wanted;
+    }
+    LocalBeams local;
+    to_body(beams, T_world_body, radius_m, local);
+    const BeamReach reach{
+        static_cast<float>(tangent_),
+        static_cast<float>(range_max_m_ * (1 + 2 * double{kBeamSlack}) + kEmbreeSlack * radius_m)};
+    return tangent_ > 0 ? leaves_on_cones(boxes, local, reach, wanted)
+                        : leaves_on_rays(boxes, local, reach, wanted);
+}
+
+std::uint32_t BeamCulling::find_meeting(const BodyPoses& at, const RayBatch& beams) noexcept {
+    met_ = 0;
     std::uint32_t any = 0;
-    for (std::size_t body = 0; body < meeting_.size(); ++body) {
-        PoseLanes T_world_body;
-        poses_at(at, body, beams.time, T_world_body);
-        const std::span<const BeamBox> boxes = shapes_[shape_of_body_[body]].boxes;
-        const double radius_m = tracer_.bounding_radius_m(body);
-        if (boxes.empty()) {
-            Lanes<int> meeting;
-            find_meeting_body(beams, T_world_body, radius_m, tracer_.bounds(body), tangent_, range_max_m_, meeting);
-            meeting_[body] = bits_of(meeting) & wanted;
-        } else {
-            LocalBeams local;
-            to_body(beams, T_world_body, radius_m, local);
-            const BeamReach reach{
-                static_cast<float>(tangent_),
-                static_cast<float>(range_max_m_ * (1 + 2 * double{kBeamSlack}) + kEmbreeSlack * radius_m)};
-            meeting_[body] = tangent_ > 0 ? leaves_on_cones(boxes, local, reach, wanted)
-                                          : leaves_on_rays(boxes, local, reach, wanted);
-        }
-        any |= meeting_[body];
+    const auto try_body = [&](std::size_t body) {
+        const std::uint32_t met = meeting(at, beams, body);
+        if (met != 0) meetings_[met_++] = {static_cast<std::uint32_t>(body), met};
+        any |= met;
+    };
+    if (const BodyTree* const tree = tracer_.tree(at)) {
+        tree->visit(
+            lanes_below(beams.n),
+            [&](const BodyTree::Node& node, std::uint32_t lanes) {
+                return lanes == 0 ? 0 : near_sphere(beams, node.bounds, tangent_, range_max_m_) & lanes;
+            },
+            [&](std::uint32_t body, std::uint32_t) {
+                try_body(body);
+                return 0u;
+            });
+        std::ranges::sort(std::span(meetings_).first(met_), {}, &Meeting::body);
+    } else {
+        for (std::size_t body = 0; body < meetings_.size(); ++body) try_body(body);
     }
     return any;
 }
 
 std::span<const std::uint32_t> BeamCulling::bodies_of(std::uint32_t beams) noexcept {
     std::size_t n = 0;
-    for (std::size_t body = 0; body < meeting_.size(); ++body)
-        if ((meeting_[body] & beams) != 0) bodies_[n++] = static_cast<std::uint32_t>(body);
+    for (const Meeting& m : std::span(meetings_).first(met_))
+        if ((m.beams & beams) != 0) bodies_[n++] = m.body;
     return std::span(bodies_).first(n);
 }
 

@@ -2,7 +2,7 @@
 ///
 /// Most beams of a rotation hit nothing, even where the LiDAR is inside a bounding ellipsoid, as in that of its own
 /// mount. Beams, which are cones, are tested against a body's tree of boxes (Shape::boxes), sixteen at a time; only
-/// those that touch a leaf are traced.
+/// those that touch a leaf are traced. Among many bodies those near the beams are found in the tree over them.
 #pragma once
 
 #include <cstdint>
@@ -38,11 +38,18 @@ private:
         std::vector<BeamBox> boxes;
     };
 
+    struct Meeting {
+        std::uint32_t body, beams;  ///< a bit for each beam that may meet the body
+    };
+    [[nodiscard]] std::uint32_t meeting(const BodyPoses& at, const RayBatch& beams,
+                                        std::size_t body) const noexcept;
+
     const Tracer& tracer_;
     double tangent_, range_max_m_;
     std::vector<BoxedShape> shapes_;
     std::vector<std::size_t> shape_of_body_;  ///< index into shapes_
-    std::vector<std::uint32_t> meeting_;      ///< for each body a bit for each beam that may meet it
+    std::vector<Meeting> meetings_;           ///< of the batch, by body; as long as there are bodies
+    std::size_t met_ = 0;                     ///< number of them
     std::vector<std::uint32_t> bodies_;
 };
 

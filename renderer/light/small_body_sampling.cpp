@@ -50,7 +50,7 @@ Cone cone_of(const Tracer& tracer, const BodyPoses& at, const Receiver& to, std:
 SmallBodySampling::SmallBodySampling(const Tracer& tracer, const BodyPoses& at, const Receiver& to) noexcept {
     const bool meets_itself = to.body >= 0 && !tracer.shape(static_cast<std::size_t>(to.body)).properties().convex;
     double wide = meets_itself ? kOwnShape : 0;
-    for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
+    for (const std::uint32_t body : tracer.largest_bodies()) {
         const Cone c = cone_of(tracer, at, to, body);
         (c.is_small() ? sum_ : wide) += c.importance;
     }
@@ -60,9 +60,8 @@ SmallBodySampling::SmallBodySampling(const Tracer& tracer, const BodyPoses& at, 
 }
 
 bool SmallBodySampling::may_help(const Tracer& tracer, const BodyPoses& at) noexcept {
-    const std::size_t n = at.T_world_body.size();
-    for (std::size_t seen = 0; seen < n; ++seen)
-        for (std::size_t from = 0; from < n; ++from) {
+    for (const std::uint32_t seen : tracer.largest_bodies())
+        for (const std::uint32_t from : tracer.all_bodies()) {
             if (from == seen) continue;
             const double radius_m = tracer.bounding_radius_m(seen),
                          farthest_m = norm(at.T_world_body[seen].t - at.T_world_body[from].t) +
@@ -76,7 +75,7 @@ Vec3 SmallBodySampling::direction(const Tracer& tracer, const BodyPoses& at, con
                                   double u, double v) const noexcept {
     double left = choice * sum_;
     Cone chosen;
-    for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
+    for (const std::uint32_t body : tracer.largest_bodies()) {
         const Cone c = cone_of(tracer, at, to, body);
         if (!c.is_small()) continue;
         chosen = c;
@@ -90,7 +89,7 @@ Vec3 SmallBodySampling::direction(const Tracer& tracer, const BodyPoses& at, con
 double SmallBodySampling::pdf(const Tracer& tracer, const BodyPoses& at, const Receiver& to,
                               const Vec3& direction) const noexcept {
     double density = 0;
-    for (std::size_t body = 0; body < at.T_world_body.size(); ++body) {
+    for (const std::uint32_t body : tracer.largest_bodies()) {
         const Cone c = cone_of(tracer, at, to, body);
         if (c.is_small() && c.holds(direction)) density += c.importance / sum_ * c.pdf();
     }

@@ -182,10 +182,10 @@ void Collector::put_into(RadianceImage& out, std::vector<float>* variance) const
 
 }  // namespace
 
-void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out,
-                         std::vector<float>* variance) {
+void add_subpixel_bodies(const Frame& f, const PixelBlock& block, std::span<const std::uint32_t> bodies,
+                         RadianceImage& out, std::vector<float>* variance) {
     std::optional<Collector> collector;  // constructed only for blocks that need it
-    for (std::size_t body = 0; body < f.at.T_world_body.size(); ++body) {
+    for (const std::uint32_t body : bodies) {
         const auto disc =
             f.subpixel_bodies.disc_within(static_cast<int>(body), block.x_first, block.y_first,
                                           block.x_first + block.width - 1, block.y_first + block.height - 1);

@@ -28,7 +28,8 @@ inline constexpr std::uint32_t kSubpixelSamplesLeast = 1024, kSubpixelSamplesMos
 /// shared among pixels by cubic interpolation, so that the filtered image has its centroid at the point. Each point
 /// represents its part of the solid angle, is traced like a camera ray, and counts only if it hits the body, so
 /// nearer bodies occlude it. `variance` may be null; it gets the variance of independent samples, an upper bound
-/// for stratified ones.
-void add_subpixel_bodies(const Frame& f, const PixelBlock& block, RadianceImage& out, std::vector<float>* variance);
+/// for stratified ones. `bodies`: those that may be in the block.
+void add_subpixel_bodies(const Frame& f, const PixelBlock& block, std::span<const std::uint32_t> bodies,
+                         RadianceImage& out, std::vector<float>* variance);
 
 }  // namespace narpa

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "apps/cli.h"
-#include "emulator/trajectory.h"
 #include "emulator/world.h"
+#include "renderer/assets/trajectory.h"
 #include "tracking/frame_tracker.h"
 
 namespace narpa::cli {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "emulator/frame_observer.h"
-#include "emulator/trajectory.h"
+#include "renderer/assets/trajectory.h"
 #include "renderer/scene/scene.h"
 
 namespace narpa {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "base/constants.h"
+#include "base/motion_between.h"
 #include "base/time.h"
 
 namespace narpa {
@@ -12,21 +12,6 @@ namespace {
 
 constexpr double kSecondsPerNs = 1e-9;
 constexpr std::int64_t kHistory_ns = kSecond_ns;  // sensors look back by an exposure or a packet, never more
-
-bool at_rest(const Motion& m) {
-    return m.velocity_m_s == Vec3{};
-}
-
-/// Rotation from `a` to `b` within `h` seconds, in the frame of `a`: by the shortest arc, or, where the commanded
-/// rates are of more than half a turn, with the number of whole turns that comes closest to them.
-Vec3 rotation_between(const Motion& a, const Motion& b, double h) {
-    const Vec3 shortest = rotation_vector(conjugate(a.T_world_body.q) * b.T_world_body.q);
-    const Vec3 commanded = (0.5 * h) * (a.rate_rad_s + b.rate_rad_s);
-    if (!(norm(commanded) > kPi)) return shortest;
-    const double angle = norm(shortest);
-    const Vec3 axis = angle > 1e-9 ? shortest / angle : commanded / norm(commanded);
-    return shortest + (2 * kPi * std::round((dot(commanded, axis) - angle) / (2 * kPi))) * axis;
-}
 
 }  // namespace
 
@@ -95,22 +80,8 @@ PoseTrack::Found PoseTrack::bracket(std::int64_t t_ns, Sample& before, Sample& a
 Motion PoseTrack::interpolate(const Sample& a, const Sample& b, std::int64_t t_ns) const noexcept {
     assert(a.t_ns < b.t_ns && a.t_ns <= t_ns && t_ns <= b.t_ns);
     const double h = static_cast<double>(b.t_ns - a.t_ns) * kSecondsPerNs;
-    const double u = static_cast<double>(t_ns - a.t_ns) / static_cast<double>(b.t_ns - a.t_ns), u2 = u * u;
-    const Rigid3 &Ta = a.motion.T_world_body, &Tb = b.motion.T_world_body;
-    const Vec3 chord = Tb.t - Ta.t, va = a.motion.velocity_m_s, vb = b.motion.velocity_m_s;
-    Motion m;
-    if (at_rest(a.motion) && at_rest(b.motion)) {
-        m.T_world_body.t = Ta.t + u * chord;
-        m.velocity_m_s = chord / h;
-    } else {
-        m.T_world_body.t =
-            Ta.t + (u2 * (3 - 2 * u)) * chord + (h * u * (1 - u) * (1 - u)) * va - (h * u2 * (1 - u)) * vb;
-        m.velocity_m_s = (6 * u * (1 - u) / h) * chord + ((1 - u) * (1 - 3 * u)) * va + (u * (3 * u - 2)) * vb;
-    }
-    const Vec3 rotation = rotation_between(a.motion, b.motion, h);
-    m.T_world_body.q = norm(rotation) > kPi ? normalized(Ta.q * exp_rotation(u * rotation)) : slerp(Ta.q, Tb.q, u);
-    m.rate_rad_s = rotation / h;
-    return m;
+    const double u = static_cast<double>(t_ns - a.t_ns) / static_cast<double>(b.t_ns - a.t_ns);
+    return motion_between(a.motion, b.motion, h, u);
 }
 
 TrackedPose PoseTrack::at(std::int64_t t_ns) const noexcept {

@@ -9,7 +9,7 @@
 
 #include "base/result.h"
 #include "emulator/pose_track.h"
-#include "emulator/trajectory.h"
+#include "renderer/assets/trajectory.h"
 #include "renderer/light/render_scene.h"
 #include "renderer/scene/scene.h"
 

@@ -12,8 +12,8 @@
 #include "drivers/can/can_bus.h"
 #include "drivers/can/remote_clock.h"
 #include "emulator/clock.h"
-#include "emulator/trajectory.h"
 #include "protocols/can/messages.h"
+#include "renderer/assets/trajectory.h"
 #include "renderer/keys/shipped_file.h"
 
 namespace narpa::cli {

@@ -10,8 +10,8 @@
 
 #include "bench/commands/scene.h"
 #include "bench/gates.h"
-#include "emulator/trajectory.h"
 #include "plot/plot.h"
+#include "renderer/assets/trajectory.h"
 
 namespace narpa::cli {
 namespace {

@@ -119,7 +119,7 @@ void read_outputs(TableReader& table, Outputs& outputs) {
 void read_head(TableReader& root, Recipe& r) {
     auto table = root.table("dataset");
     if (!table) return;
-    std::vector<std::string> names;
+    TakenNames names;
     r.name = read_name(*table, names);
     if (const auto scene = table->text("scene")) {
         auto path = find_scene(r.file, *scene);
@@ -178,7 +178,7 @@ void read_distributions(TableReader& root, Recipe& r) {
 }
 
 void read_lists(TableReader& root, Recipe& r) {
-    std::vector<std::string> names;
+    TakenNames names;
     auto variants = root.tables("variant");
     if (!variants.empty()) r.variants.clear();
     for (TableReader& table : variants) {

@@ -9,7 +9,7 @@
 #include "emulator/bus/can_node.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/log/mcap_log.h"
-#include "emulator/trajectory.h"
+#include "renderer/assets/trajectory.h"
 #include "renderer/camera/read_out.h"
 
 namespace narpa {

@@ -8,9 +8,9 @@
 #include <type_traits>
 
 #include "base/pixel_format.h"
-#include "emulator/trajectory.h"
 #include "protocols/ledger_fields.h"
 #include "python/module/raise.h"
+#include "renderer/assets/trajectory.h"
 
 namespace narpa::python {
 namespace {

@@ -42,7 +42,7 @@ constexpr TableKey kScenarioFileRows[]{
 std::optional<Scene> read_head(TableReader& root, Scenario& s, Problems& problems) {
     auto table = root.table("scenario");
     if (!table) return std::nullopt;
-    std::vector<std::string> names;
+    TakenNames names;
     s.name = read_name(*table, names);
     if (s.name.starts_with('.')) table->fail("name", "is that of the results' folder, expected no '.' in front");
     s.title = table->text("title").value_or(s.name);

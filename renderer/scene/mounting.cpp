@@ -10,6 +10,8 @@ namespace {
 
 constexpr TableKey kMountingRows[]{kNameRow, kMountRow, kPositionRow, kAttitudeRow, kLookAtRow, kUpRow};
 
+constexpr std::size_t kLongestName = 64;
+
 bool allowed_in_name(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
            c == '.';
@@ -68,17 +70,17 @@ Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, Atti
     return m;
 }
 
-std::string read_name(TableReader& table, std::vector<std::string>& taken) {
-    constexpr std::size_t kLongest = 64;
+bool is_name(std::string_view name) {
+    return !name.empty() && name.size() <= kLongestName && std::ranges::all_of(name, allowed_in_name);
+}
+
+std::string read_name(TableReader& table, TakenNames& taken) {
     std::string name = table.text("name").value_or("");
-    const bool good =
-        !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), allowed_in_name);
-    if (table.has("name") && !good)
-        table.fail("name", fmt::format("expected 1 to {} letters, digits, '_', '-' or '.'", kLongest));
-    if (good && std::find(taken.begin(), taken.end(), name) != taken.end())
+    if (table.has("name") && !is_name(name))
+        table.fail("name", fmt::format("expected 1 to {} letters, digits, '_', '-' or '.'", kLongestName));
+    if (!taken.insert(name).second && is_name(name))
         table.fail("name",
                    fmt::format("\"{}\" is the name of another {}, expected a name of its own", name, table.name()));
-    taken.push_back(name);
     return name;
 }
 

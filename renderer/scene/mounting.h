@@ -2,6 +2,8 @@
 #pragma once
 
 #include <string>
+#include <string_view>
+#include <unordered_set>
 #include <vector>
 
 #include "renderer/keys/toml_reader.h"
@@ -28,7 +30,11 @@ Quat lidar_attitude(const Vec3& forward, const Vec3& right);   ///< x right, y f
 /// Where a camera, a LiDAR or a light sits: `mount`, `position_m`, and `attitude_wxyz` or `look_at` with `up`.
 Mounting read_mounting(TableReader& table, const std::vector<Body>& bodies, AttitudeOf attitude_of);
 
-/// `name`: 1 to 64 of letters, digits, '_', '-', '.'; used by no other table of its kind (`taken`).
-std::string read_name(TableReader& table, std::vector<std::string>& taken);
+/// Names that tables of one kind have.
+using TakenNames = std::unordered_set<std::string>;
+/// Whether it is 1 to 64 of letters, digits, '_', '-', '.'.
+[[nodiscard]] bool is_name(std::string_view name);
+/// `name`, which no other table of its kind has.
+std::string read_name(TableReader& table, TakenNames& taken);
 
 }  // namespace narpa

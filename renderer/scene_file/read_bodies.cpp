@@ -4,7 +4,7 @@
 #include "base/constants.h"
 #include "renderer/ephemeris/iau_rotation.h"
 #include "renderer/geometry/shape_kind.h"
-#include "renderer/scene_file/scene_parts.h"
+#include "renderer/scene_file/trajectory_bodies.h"
 
 namespace narpa {
 
@@ -25,6 +25,7 @@ constexpr TableKey kBodyRows[]{
     {"orbit", rows::table(kOrbitKeys)},
     {"rate_rad_s", rows::vec3()},
     {"rotation", rows::choice<kRotatingBodies>()},
+    {"trajectory", rows::file()},
     {"can_id", rows::integer(0, kLastBaseId)},
     {"material", rows::table(kMaterialKeys)},
     {"mark", rows::tables(kMarkKeys)},
@@ -119,15 +120,36 @@ void read_motion(TableReader& table, Motion& motion) {
     table.read("rate_rad_s", motion.rate_rad_s);
 }
 
+/// One body for each name, alike but for the motion. Their mesh is the last of `reading.meshes`, if these have
+/// become more.
+void add_bodies(const std::vector<NamedCourse>& all, const Body& alike, std::size_t meshes, SceneReading& reading) {
+    const bool has_mesh = reading.meshes.size() > meshes;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        if (has_mesh && i > 0) {
+            NamedMesh mesh = reading.meshes.back();
+            mesh.body = reading.scene.bodies.size();
+            reading.meshes.push_back(std::move(mesh));
+        }
+        Body& body = reading.scene.bodies.emplace_back(alike);
+        body.name = all[i].name;
+        if (!all[i].course) continue;
+        body.course = all[i].course;
+        body.initial = body.course->at(0);
+    }
+}
+
 }  // namespace
 
 constinit const TableKeys kBodyKeys{.rows = kBodyRows, .parts = {&kShapeKeys}};
 
 void read_bodies(TableReader& root, SceneReading& reading) {
-    std::vector<std::string> names;
+    TakenNames names;
+    TrajectoryFiles trajectories(reading);
     for (TableReader& table : root.tables("body")) {
+        const std::vector<NamedCourse> all = read_named_courses(table, names, trajectories);
         Body body;
-        body.name = read_name(table, names);
+        if (!all.empty()) body.name = all.front().name;
+        const std::size_t meshes = reading.meshes.size();
         read_shape(table, body, reading);
         read_motion(table, body.initial);
         read_rotation(table, body.initial, reading);
@@ -135,7 +157,7 @@ void read_bodies(TableReader& root, SceneReading& reading) {
         read_can_id(table, body, reading.scene.bodies);
         read_marks(table, body);
         table.finish();
-        reading.scene.bodies.push_back(std::move(body));
+        add_bodies(all, body, meshes, reading);
     }
 }
 

@@ -171,8 +171,7 @@ bool lights_an_area(const Lidar& lidar) {
 
 constinit const TableKeys kLidarKeys{.rows = kLidarRows, .parts = {&kMountingKeys}};
 
-Lidar read_lidar(TableReader& table, std::vector<std::string>& names, Scene& scene,
-                 const std::filesystem::path& folder) {
+Lidar read_lidar(TableReader& table, TakenNames& names, Scene& scene, const std::filesystem::path& folder) {
     Lidar lidar;
     lidar.name = read_name(table, names);
     const Mounting mounting = read_mounting(table, scene.bodies, lidar_attitude);

@@ -28,7 +28,7 @@ std::vector<TableKind> light_kinds() {
         {names[0], kPointRows}, {names[1], kDirectionalRows}, {names[2], kRectangleRows}, {names[3], kDiscRows}};
 }
 
-Light read_light(TableReader& table, std::vector<std::string>& names, const std::vector<Body>& bodies) {
+Light read_light(TableReader& table, TakenNames& names, const std::vector<Body>& bodies) {
     Light light;
     light.name = read_name(table, names);
     const auto kind = table.kind();
@@ -57,7 +57,7 @@ Light read_light(TableReader& table, std::vector<std::string>& names, const std:
 constinit const TableKeys kLightKeys{.rows = kLightRows, .kinds = light_kinds};
 
 void read_lights(TableReader& root, SceneReading& reading) {
-    std::vector<std::string> names;
+    TakenNames names;
     for (TableReader& table : root.tables("light"))
         reading.scene.lights.push_back(read_light(table, names, reading.scene.bodies));
 }

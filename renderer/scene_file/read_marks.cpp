@@ -55,7 +55,7 @@ void read_tag(TableReader& table, Mark& mark) {
     table.read("attitude_wxyz", mark.T_body_mark.q);
 }
 
-Mark read_mark(TableReader& table, std::vector<std::string>& names) {
+Mark read_mark(TableReader& table, TakenNames& names) {
     Mark mark;
     mark.name = read_name(table, names);
     table.read("position_m", mark.T_body_mark.t);
@@ -88,7 +88,7 @@ void check_tag(TableReader& table, const Mark& mark, const std::vector<Mark>& ot
 constinit const TableKeys kMarkKeys{.rows = kMarkRows, .kinds = mark_kinds};
 
 void read_marks(TableReader& body_table, Body& body) {
-    std::vector<std::string> names;
+    TakenNames names;
     for (TableReader& table : body_table.tables("mark")) {
         const Mark mark = read_mark(table, names);
         check_tag(table, mark, body.marks);

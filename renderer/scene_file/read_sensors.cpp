@@ -114,7 +114,7 @@ void refuse_tables_of_camera(TableReader& root) {
                         fmt::format("belongs to a camera, expected [camera.{}] after its [[camera]]", key->name));
 }
 
-Camera read_camera(TableReader& table, std::vector<std::string>& names, SceneReading& reading) {
+Camera read_camera(TableReader& table, TakenNames& names, SceneReading& reading) {
     const Scene& scene = reading.scene;
     const std::filesystem::path& folder = reading.folder;
     Camera camera;
@@ -165,7 +165,7 @@ constinit const TableKeys kCameraKeys{.rows = kCameraRows,
 
 void read_sensors(TableReader& root, SceneReading& reading) {
     Scene& scene = reading.scene;
-    std::vector<std::string> cameras, lidars;
+    TakenNames cameras, lidars;
     for (TableReader& table : root.tables("camera")) scene.cameras.push_back(read_camera(table, cameras, reading));
     for (TableReader& table : root.tables("lidar"))
         scene.lidars.push_back(read_lidar(table, lidars, scene, reading.folder));

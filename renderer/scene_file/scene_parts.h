@@ -76,8 +76,7 @@ void read_sensors(TableReader& root, SceneReading& reading);
 void read_projection(TableReader& camera_table, Camera& camera, const std::filesystem::path& folder,
                      std::vector<std::string>& warnings);
 /// A [[lidar]]; paths start at `folder`.
-Lidar read_lidar(TableReader& table, std::vector<std::string>& names, Scene& scene,
-                 const std::filesystem::path& folder);
+Lidar read_lidar(TableReader& table, TakenNames& names, Scene& scene, const std::filesystem::path& folder);
 /// `dem` of a body, which has one, without opening it.
 void read_dem(TableReader& body, int material, SceneReading& reading);
 /// Opens every DEM that was named; cameras and LiDARs come first.

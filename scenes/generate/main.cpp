@@ -1,5 +1,5 @@
-/// make_scene docking|craft|descent|small_body|tag_board|landing|terrain OUTDIR - writes the meshes, textures and
-/// tables of a scene. The same bytes each time.
+/// make_scene docking|craft|descent|small_body|tag_board|landing|debris|terrain OUTDIR - writes the meshes,
+/// textures and tables of a scene. The same bytes each time.
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -51,6 +51,9 @@ bool write_scene(std::string_view scene, const Output& out) {
         out.plain_mesh("landing_site", build_landing_site());
         out.plain_mesh("landing_map", build_landing_map());
         out.mesh("lander", build_lander(), lander_materials());
+    } else if (scene == "debris") {
+        for (const DebrisName& d : kDebrisNames) out.mesh(d.name, build_debris(d.kind), debris_materials());
+        write_debris(out.directory + "/debris.csv");
     } else if (scene == "terrain") {
         write_highland(out.directory + "/highland.png");
     } else {
@@ -70,7 +73,7 @@ int main(int argc, char** argv) {
         return 1;
     }
     std::fputs(
-        "usage: make_scene docking|craft|descent|small_body|tag_board|landing|terrain OUTDIR   (an existing "
+        "usage: make_scene docking|craft|descent|small_body|tag_board|landing|debris|terrain OUTDIR   (an existing "
         "folder)\n",
         stderr);
     return 2;

@@ -1,6 +1,8 @@
 /// scenes/generate/scenes.h - the meshes and tables of the generated scenes. Metres; triangles face outwards.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -71,6 +73,25 @@ Mesh build_landing_site();
 /// off by some centimetres.
 Mesh build_landing_map();
 Mesh build_lander();
+
+// --- Debris: what is left of a satellite, 40 minutes after it broke up. A cloud of small pieces, 70 m along x,
+// that expands from its middle while they tumble ---
+
+enum class DebrisKind : std::uint8_t { panel, rod, block, flake };
+struct DebrisName {
+    DebrisKind kind;
+    const char* name;  ///< of its mesh; the pieces are `name`-NUMBER
+};
+inline constexpr std::array<DebrisName, 4> kDebrisNames{{{DebrisKind::panel, "panel"},
+                                                         {DebrisKind::rod, "rod"},
+                                                         {DebrisKind::block, "block"},
+                                                         {DebrisKind::flake, "flake"}}};
+inline constexpr int kDebrisPieces = 10000;
+std::vector<MaterialSpec> debris_materials();
+/// Some tens of triangles, up to 1.2 m long.
+Mesh build_debris(DebrisKind kind);
+/// Writes the table of the pieces' motions. Throws std::runtime_error where it cannot.
+void write_debris(const std::string& path);
 
 // --- Terrain: an elevation model of cratered ground, 4.1 km square, hills of a hundred metres and craters of 8 to
 // 500 m, as a 16-bit PNG ---

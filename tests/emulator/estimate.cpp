@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "emulator/camera/camera_unit.h"
-#include "emulator/trajectory.h"
+#include "renderer/assets/trajectory.h"
 #include "renderer/camera/scene_camera.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"

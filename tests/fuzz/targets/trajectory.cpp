@@ -1,5 +1,5 @@
 // A trajectory (CSV).
-#include "emulator/trajectory.h"
+#include "renderer/assets/trajectory.h"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
-/// emulator/trajectory.h - poses of bodies over time as CSV: the input of `narpa fly` and the format of the truth
-/// log.
+/// renderer/assets/trajectory.h - poses of bodies over time as CSV: the input of `narpa fly` and the format of the
+/// truth log.
 ///
 /// First line: kTrajectoryHeader. Then one row per body and time: seconds of simulation time, the body's name,
 /// position (m, world), attitude (w, x, y, z; body to world), velocity (m/s, world), rate (rad/s, body axes).

@@ -1,5 +1,5 @@
 // The trajectory file: what is read back is what was written, and what is wrong is named with its place.
-#include "emulator/trajectory.h"
+#include "renderer/assets/trajectory.h"
 
 #include <gtest/gtest.h>
 

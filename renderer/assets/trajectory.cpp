@@ -1,4 +1,4 @@
-#include "emulator/trajectory.h"
+#include "renderer/assets/trajectory.h"
 
 #include <fmt/format.h>
 
@@ -12,18 +12,18 @@
 namespace narpa {
 namespace {
 
-constexpr int kColumns = 15;
+constexpr int kTrajectoryColumns = 15;
 
-Result<TrajectoryRow> read_row(const CsvRow& csv, const std::string& path) {
+Result<TrajectoryRow> read_trajectory_row(const CsvRow& csv, const std::string& path) {
     const auto bad = [&](std::string_view cell, std::string what) {
         return Error{std::move(what), path, csv.number, csv.column_of(cell)};
     };
     const std::vector<std::string_view>& cells = csv.cells;
-    if (cells.size() != kColumns)
+    if (cells.size() != kTrajectoryColumns)
         return bad(cells.front(),
-                   fmt::format("{} columns, expected {}: {}", cells.size(), kColumns, kTrajectoryHeader));
-    std::array<double, kColumns> v{};
-    for (std::size_t i = 0; i < kColumns; ++i) {
+                   fmt::format("{} columns, expected {}: {}", cells.size(), kTrajectoryColumns, kTrajectoryHeader));
+    std::array<double, kTrajectoryColumns> v{};
+    for (std::size_t i = 0; i < kTrajectoryColumns; ++i) {
         if (i == 1) continue;
         const std::optional<double> number = csv.number_in(cells[i]);
         if (!number || !std::isfinite(*number))
@@ -54,7 +54,7 @@ Result<std::vector<TrajectoryRow>> read_trajectory(const std::string& path) {
     std::vector<TrajectoryRow> rows;
     std::map<std::string, std::int64_t> last;
     const auto take = [&](const CsvRow& csv) -> Status {
-        auto row = read_row(csv, path);
+        auto row = read_trajectory_row(csv, path);
         if (!row) return row.error();
         const auto [at, first] = last.try_emplace(row->body, row->t_ns);
         if (!first && row->t_ns <= at->second)

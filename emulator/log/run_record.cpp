@@ -16,6 +16,7 @@
 #include "base/file_bytes.h"
 #include "base/fnv1a.h"
 #include "base/write_file.h"
+#include "emulator/log/calibration_document.h"
 #include "renderer/keys/toml_file.h"
 #include "renderer/scene_file/scene_file.h"
 #include "renderer/scene_file/scene_inputs.h"
@@ -123,7 +124,8 @@ Status remove_run(const std::string& folder) {
         error.what += "; the folder's files stay, expected a new folder or that of a run";
         return error;
     }
-    std::vector<fs::path> files{fs::path(folder) / "can.log", fs::path(folder) / "scene.toml"};
+    std::vector<fs::path> files;
+    for (const char* name : {"can.log", "scene.toml", "calibration.json"}) files.push_back(fs::path(folder) / name);
     for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
         const std::string path = at->path();
         const auto is_of = [&](std::string_view ending) { return path.ends_with(ending); };
@@ -143,6 +145,8 @@ Status write_run_record(const std::string& folder, const Scene& scene) {
     const auto text = TomlFile::read(scene.file, "scene", kSceneFileKeys, scene.overrides);
     if (!text) return text.error();
     if (Status written = write_file(folder + "/scene.toml", text->text() + '\n'); !written) return written;
+    if (Status written = write_file(folder + "/calibration.json", calibration_document(scene)); !written)
+        return written;
     const RenderSettings& r = scene.render;
     const json document{
         {"format", kFormat},

@@ -33,7 +33,7 @@ struct RunRecord {
 /// Removes the log of an earlier run, whose sensors may be others, from its folder. Other files stay, and so do
 /// links, which the next log writes through. Error: run.json is not a run's; nothing is removed.
 Status remove_run(const std::string& folder);
-/// Writes FOLDER/run.json, and FOLDER/scene.toml: the scene with all that it is based on.
+/// Writes FOLDER/run.json, FOLDER/scene.toml: the scene with all that it is based on, and FOLDER/calibration.json.
 Status write_run_record(const std::string& folder, const Scene& scene);
 /// Reads it back. Errors name file, line and what was expected.
 Result<RunRecord> read_run_record(const std::string& folder);

@@ -125,6 +125,14 @@ class Run:
     def messages(self, dbc=None):
         return messages(self.log / "can.log", dbc)
 
+    def calibration(self):
+        """{name: Sensor} of the scene's cameras and LiDARs. Like marks() and scenario(), of a run that has started, too."""
+        return read_calibration(self.log / "calibration.json")
+
+    def marks(self, body=None):
+        """[Mark, ...] of all bodies, or of one."""
+        return read_marks(self.log / "calibration.json", body)
+
     def record(self):
         """run.json: scene, settings, the files that the scene was read from."""
         return json.loads((self.log / "run.json").read_text())
@@ -203,7 +211,7 @@ def read_marks(path, body=None):
 
 
 def read_calibration(path):
-    """{name: Sensor} of calibration.json, which `narpa check SCENE --calibration DIR` writes."""
+    """{name: Sensor} of calibration.json, which `narpa check SCENE --calibration DIR` and `narpa run --log DIR` write."""
     return _read(path, lambda document: {s["name"]: Sensor(s) for s in document["cameras"] + document["lidars"]})
 
 

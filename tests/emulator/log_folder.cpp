@@ -44,7 +44,7 @@ protected:
 TEST_F(LogFolder, ARunThatCannotStartLeavesTheLogOfAnEarlierOne) {
     ran(scene(small_scene()), of_both_sensors());
     const Files before = files();
-    EXPECT_EQ(before.size(), 8U);
+    EXPECT_EQ(before.size(), 9U);
     RunOptions video = of_both_sensors(), lidar = of_both_sensors(), estimate = of_both_sensors();
     video.video[0].second = "/nowhere/at/all.y4m";
     lidar.lidar[0].second = "/nowhere/at/all.pcap";
@@ -62,14 +62,14 @@ TEST_F(LogFolder, HasNoFilesOfSensorsThatTheRunLacks) {
     RunOptions lidar = options();
     lidar.lidar = {{"top", "none"}};
     ran(scene(small_scene()), lidar);
-    EXPECT_EQ(names(), (std::vector<std::string>{"can.log", "nav.y4m.png", "notes.csv", "run.json", "scene.toml",
-                                                 "top.sweeps.csv"}));
+    EXPECT_EQ(names(), (std::vector<std::string>{"calibration.json", "can.log", "nav.y4m.png", "notes.csv",
+                                                 "run.json", "scene.toml", "top.sweeps.csv"}));
     RunOptions unheard = of_both_sensors();
     unheard.bus.clear(), unheard.lidar.clear();
     unheard.lockstep = false, unheard.duration_s = 0.2;
     ran(scene(small_scene()), unheard);
-    EXPECT_EQ(names(), (std::vector<std::string>{"nav.ledger.csv", "nav.png", "nav.truth.csv", "nav.y4m.png",
-                                                 "notes.csv", "run.json", "scene.toml"}));
+    EXPECT_EQ(names(), (std::vector<std::string>{"calibration.json", "nav.ledger.csv", "nav.png", "nav.truth.csv",
+                                                 "nav.y4m.png", "notes.csv", "run.json", "scene.toml"}));
 }
 
 TEST_F(LogFolder, FilesBesideARunJsonThatIsNoRunsStay) {

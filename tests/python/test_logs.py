@@ -93,6 +93,16 @@ class Logs(unittest.TestCase):
         self.assertEqual([m["radius_m"] for m in logs.read_marks(path, "station")], [0.1])
         np.testing.assert_allclose(logs.read_marks(path, "board")[0].corners_m, [[1, -1, 1], [1, 1, 1], [1, 1, -1], [1, -1, -1]], atol=1e-12)
 
+    def test_calibration_and_marks_of_a_run(self):
+        lamp = {"name": "top", "body": "station", "kind": "lamp", "position_m": [1, 2, 3], "radius_m": 0.1}
+        nav = {"name": "nav", "mount": "chaser", "position_m": [1, 0, 0], "attitude_wxyz": [1, 0, 0, 0]}
+        (self.folder / "run.json").write_text("{}")
+        (self.folder / "calibration.json").write_text(json.dumps({"cameras": [nav], "lidars": [], "marks": [lamp]}))
+        run = logs.Run(self.folder)
+        self.assertEqual(run.calibration()["nav"].mount, "chaser")
+        self.assertEqual([m.name for m in run.marks("station")], ["top"])
+        self.assertEqual(run.marks("chaser"), [])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -5,6 +5,7 @@ Usage: rehearse.py docks       the last ten metres: docks within the docking sta
                                same on 1 and 2 threads
        rehearse.py fails       scenarios that must fail do so, each at its gate: one, or with NARPA_CAMPAIGN all three
        rehearse.py another     with the Python navigation of examples/ in place of narpa's, as docs/interfaces.md says
+       rehearse.py docks-in-python  with the navigation of examples/ that docks
        rehearse.py lands       from 1200 m to the site within the gates, the first seconds byte for byte the same on 1 and 2 threads;
                                and a stuck throttle that fails at the vertical velocity
        rehearse.py gale        on the elevation model of Gale crater, where ../shared/assets has it
@@ -99,11 +100,26 @@ def fails():
         expect(failed.keys() <= {gate} | too, f"{name} fails at nothing else: {sorted(failed)}")
 
 
-def another():
+def need_modules_of_examples():
     try:
-        import can, cv2, serial  # noqa: F401: needed by the example
+        import can, cv2, numpy, serial, tomllib  # noqa: F401
     except ImportError as error:
-        support.skip(f"{error} (python3-can, python3-opencv, python3-serial)")
+        support.skip(f"{error} (Python 3.11, python3-can, python3-numpy, python3-opencv, python3-serial)")
+
+
+def docks_in_python():
+    need_modules_of_examples()
+    example = Path(__file__).resolve().parents[2] / "examples/docking_navigation.py"
+    folder = support.work_folder()
+    status, verdict = rehearse(SCENARIOS / "dispersions.toml", folder / "out", "--navigation", f"{sys.executable} {example}")
+    expect(status == 0, f"docks with all gates passed: {verdict['headline']}, {failed_gates(verdict)}")
+    n = verdict["navigation"]
+    expect(n["with_frames"] > 0.9 * n["estimates"], f"lamps were found: in {n['with_frames']} of {n['estimates']} frames")
+    expect(n["nees"] < 9, f"covariances hold: NEES {n['nees']}")
+
+
+def another():
+    need_modules_of_examples()
     folder = support.work_folder()
     example = Path(__file__).resolve().parents[2] / "examples/navigation.py"
     command = f"{sys.executable} {example} $BUS ${{VIDEO#nav=}}"
@@ -154,4 +170,4 @@ def dense():
     expect(n["nees"] < 14, f"covariances hold: NEES {n['nees']}")
 
 
-{"docks": docks, "lands": lands, "gale": gale, "fails": fails, "another": another, "flies": flies, "dense": dense}[sys.argv[1]]()
+{"docks": docks, "lands": lands, "gale": gale, "fails": fails, "another": another, "docks-in-python": docks_in_python, "flies": flies, "dense": dense}[sys.argv[1]]()

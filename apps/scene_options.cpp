@@ -104,7 +104,8 @@ void BudgetOptions::override_scene(RenderSettings& render) const {
 }
 
 void PoseOptions::add_to(Parser app) {
-    app.option("--trajectory", trajectory, "Trajectory or truth log (CSV) with the bodies' poses")
+    app.option("--trajectory", trajectory,
+               "The bodies' poses: trajectory or truth log (CSV), or description of files (TOML)")
         .type_name("FILE");
     app.option("--pose", poses, "A body's constant pose (metres; body to world)")
         .type_name("BODY=x,y,z,qw,qx,qy,qz")

@@ -8,7 +8,7 @@
 
 #include "apps/cli.h"
 #include "emulator/world.h"
-#include "renderer/assets/trajectory.h"
+#include "renderer/trajectory/trajectory.h"
 #include "tracking/frame_tracker.h"
 
 namespace narpa::cli {

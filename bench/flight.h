@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "emulator/frame_observer.h"
-#include "renderer/assets/trajectory.h"
 #include "renderer/scene/scene.h"
+#include "renderer/trajectory/trajectory.h"
 
 namespace narpa {
 

@@ -9,9 +9,9 @@
 
 #include "base/result.h"
 #include "emulator/pose_track.h"
-#include "renderer/assets/trajectory.h"
 #include "renderer/light/render_scene.h"
 #include "renderer/scene/scene.h"
+#include "renderer/trajectory/trajectory.h"
 
 namespace narpa {
 

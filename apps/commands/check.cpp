@@ -41,6 +41,7 @@
 #include "renderer/material/bsdf_kind.h"
 #include "renderer/scene_file/lidar_description.h"
 #include "renderer/scene_file/scene_file.h"
+#include "renderer/trajectory/trajectory_description.h"
 
 namespace narpa::cli {
 namespace {
@@ -497,8 +498,9 @@ struct SchemaRow {
     std::string name;
     const TableKeys& keys;
 };
-const std::array<SchemaRow, 4> kSchemas{{{"scene", kSceneFileKeys},
+const std::array<SchemaRow, 5> kSchemas{{{"scene", kSceneFileKeys},
                                          {"lidar", kLidarDescriptionKeys},
+                                         {"trajectory", kTrajectoryFileKeys},
                                          {"scenario", rehearsal::kScenarioFileKeys},
                                          {"dataset", dataset::kRecipeFileKeys}}};
 

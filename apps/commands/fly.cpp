@@ -13,8 +13,8 @@
 #include "drivers/can/remote_clock.h"
 #include "emulator/clock.h"
 #include "protocols/can/messages.h"
-#include "renderer/assets/trajectory.h"
 #include "renderer/keys/shipped_file.h"
+#include "renderer/trajectory/trajectory.h"
 
 namespace narpa::cli {
 namespace {
@@ -292,9 +292,10 @@ Outcome fly(const FlyOptions& o) {
 
 Command add_fly(Parser app) {
     auto o = std::make_shared<FlyOptions>();
-    const Parser c = app.subcommand("fly", "Play a trajectory (CSV) as pose commands on a CAN bus");
+    const Parser c = app.subcommand("fly", "Play a trajectory as pose commands on a CAN bus");
     c.option("TRAJECTORY", o->trajectory,
-             "Poses of bodies over time (CSV, with the columns of a run's CAMERA.truth.csv)")
+             "Poses of bodies over time: CSV with the columns of a run's CAMERA.truth.csv, or TOML that names "
+             "orbit and attitude ephemerides (CCSDS OEM, AEM) and tables")
         .required();
     c.option("--can", o->bus, can_bus_help()).type_name("BUS").required();
     c.option("--id", o->ids,

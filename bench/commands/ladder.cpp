@@ -11,7 +11,7 @@
 #include "bench/commands/scene.h"
 #include "bench/gates.h"
 #include "plot/plot.h"
-#include "renderer/assets/trajectory.h"
+#include "renderer/trajectory/trajectory.h"
 
 namespace narpa::cli {
 namespace {

@@ -9,8 +9,8 @@
 #include "emulator/bus/can_node.h"
 #include "emulator/log/ledger_log.h"
 #include "emulator/log/mcap_log.h"
-#include "renderer/assets/trajectory.h"
 #include "renderer/camera/read_out.h"
+#include "renderer/trajectory/trajectory.h"
 
 namespace narpa {
 namespace {

@@ -10,7 +10,7 @@
 #include "base/pixel_format.h"
 #include "protocols/ledger_fields.h"
 #include "python/module/raise.h"
-#include "renderer/assets/trajectory.h"
+#include "renderer/trajectory/trajectory.h"
 
 namespace narpa::python {
 namespace {

@@ -68,6 +68,7 @@ std::optional<FileKind> kind_of(const std::string& file) {
     for (int i = 0; i < kLines && std::getline(in, line); ++i) {
         if (line.starts_with("[scenario]")) return FileKind::scenario;
         if (line.starts_with("[dataset]")) return FileKind::dataset;
+        if (line.starts_with("[trajectory]")) return std::nullopt;  // its bodies are not those of a scene
         for (const char* table : {"[scene]", "[[body]]", "[[camera]]", "[[lidar]]"})
             if (line.starts_with(table)) kind = FileKind::scene;
     }

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/motion_between.h"
-#include "renderer/assets/trajectory.h"
 #include "renderer/scene_file/trajectory_bodies.h"
+#include "renderer/trajectory/trajectory.h"
 
 namespace narpa {
 namespace {

@@ -10,7 +10,7 @@
 
 namespace narpa {
 
-/// The motions of one trajectory file (renderer/assets/trajectory.h).
+/// The motions of one trajectory file (renderer/trajectory/trajectory.h).
 struct TrajectoryMotions {
     std::vector<std::string> names;  ///< of its bodies, in the order of their first rows
     std::map<std::string, std::shared_ptr<const Course>, std::less<>> courses;

@@ -6,7 +6,7 @@
 #include <future>
 #include <utility>
 
-#include "renderer/assets/trajectory.h"
+#include "renderer/trajectory/trajectory.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/support/command.h"

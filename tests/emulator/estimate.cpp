@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "emulator/camera/camera_unit.h"
-#include "renderer/assets/trajectory.h"
 #include "renderer/camera/scene_camera.h"
+#include "renderer/trajectory/trajectory.h"
 #include "tests/drivers/can_support.h"
 #include "tests/emulator/loop_support.h"
 #include "tests/protocols/mcap_reader.h"

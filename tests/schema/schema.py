@@ -30,7 +30,7 @@ def schema(kind):
     return json.loads(said.stdout)
 
 
-SCHEMAS = {kind: schema(kind) for kind in ("scene", "lidar", "scenario", "dataset")}
+SCHEMAS = {kind: schema(kind) for kind in ("scene", "lidar", "trajectory", "scenario", "dataset")}
 
 
 def errors(kind, document):
@@ -77,7 +77,7 @@ def merged(path, head):
 def kind_of(document):
     if isinstance(document.get("lidar"), dict):
         return "lidar"
-    return next((kind for kind in ("scenario", "dataset") if kind in document), "scene")
+    return next((kind for kind in ("trajectory", "scenario", "dataset") if kind in document), "scene")
 
 
 # --- The documents ---
@@ -232,6 +232,10 @@ class Documents(unittest.TestCase):
 
     def test_lidar(self):
         self.compare("lidar", "lidar-description.md")
+
+    def test_trajectory(self):
+        documented = self.compare("trajectory", "trajectories.md")
+        self.assertLessEqual({"trajectory", "world", "body", "body.table", "body.table.time", "body.table.attitude"}, set(documented))
 
 
     def test_dataset(self):

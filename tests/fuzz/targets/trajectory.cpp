@@ -1,5 +1,5 @@
 // A trajectory (CSV).
-#include "renderer/assets/trajectory.h"
+#include "renderer/trajectory/trajectory.h"
 
 #include <cmath>
 

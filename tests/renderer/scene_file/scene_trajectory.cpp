@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/assets/trajectory.h"
 #include "renderer/scene_file/scene_file.h"
+#include "renderer/trajectory/trajectory.h"
 #include "tests/renderer/scene_file/scene_support.h"
 
 namespace narpa {

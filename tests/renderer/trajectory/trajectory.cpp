@@ -1,5 +1,5 @@
 // The trajectory file: what is read back is what was written, and what is wrong is named with its place.
-#include "renderer/assets/trajectory.h"
+#include "renderer/trajectory/trajectory.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "renderer/assets/trajectory.h"
+#include "renderer/trajectory/trajectory.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +8,8 @@
 #include <map>
 
 #include "base/text/csv.h"
+#include "renderer/trajectory/ccsds_message.h"
+#include "renderer/trajectory/trajectory_description.h"
 
 namespace narpa {
 namespace {
@@ -51,6 +53,14 @@ bool accept_attitude(Quat& q) noexcept {
 }
 
 Result<std::vector<TrajectoryRow>> read_trajectory(const std::string& path) {
+    const std::string_view format = format_of_poses(path);
+    if (format == "TOML") return read_trajectory_description(path);
+    if (!format.empty())
+        return Error{
+            fmt::format("{}, expected a CSV, or a trajectory description (TOML) that names orbit and attitude "
+                        "ephemerides: docs/trajectories.md",
+                        format),
+            path, 1};
     std::vector<TrajectoryRow> rows;
     std::map<std::string, std::int64_t> last;
     const auto take = [&](const CsvRow& csv) -> Status {

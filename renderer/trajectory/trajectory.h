@@ -1,5 +1,5 @@
-/// renderer/assets/trajectory.h - poses of bodies over time as CSV: the input of `narpa fly` and the format of the
-/// truth log.
+/// renderer/trajectory/trajectory.h - poses of bodies over time as CSV: the input of `narpa fly` and the format of
+/// the truth log.
 ///
 /// First line: kTrajectoryHeader. Then one row per body and time: seconds of simulation time, the body's name,
 /// position (m, world), attitude (w, x, y, z; body to world), velocity (m/s, world), rate (rad/s, body axes).
@@ -27,7 +27,8 @@ struct TrajectoryRow {
     int line = 0;  ///< of the file that it was read from
 };
 
-/// Rows in the order of the file. Errors name file, line and column.
+/// Rows in the order of the file. TOML is a trajectory description, whose poses come from orbit and
+/// attitude ephemerides and tables (trajectory_description.h). Errors name file, line and column.
 Result<std::vector<TrajectoryRow>> read_trajectory(const std::string& path);
 
 /// Attitude as given: kept bit for bit when it is a unit quaternion to rounding, normalised when it is within 1e-3

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "emulator/trajectory_files/ccsds_message.h"
+#include "renderer/trajectory/ccsds_message.h"
 #include "tests/fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

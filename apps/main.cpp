@@ -29,7 +29,7 @@ int start_bench(char** argv, char** bench) {
     ::execvp(program.c_str(), argv + 1);
     if (errno == ENOENT)
         return finish(Error{"is not built or not installed", program, 0, 0, ErrorKind::missing,
-                            "cmake --build --preset release --target narpa-bench"},
+                            "apt install narpa-dev, or cmake --build --preset release --target narpa-bench"},
                       json);
     return finish(Error{std::strerror(errno), program, 0, 0, ErrorKind::missing}, json);
 }

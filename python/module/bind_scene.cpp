@@ -204,6 +204,14 @@ void bind_scene(py::module_& m) {
         .def_property_readonly(
             "warnings", [](const SceneSession& s) { return s.scene().warnings; },
             "Sentences of the scene's reader, as the commands print them.")
+        .def("__repr__",
+             [](const SceneSession& s) {
+                 const Scene& scene = s.scene();
+                 return fmt::format("<narpa.Scene \"{}\": bodies [{}], cameras [{}], lidars [{}]>", scene.name,
+                                    fmt::join(names_of(scene.bodies), ", "),
+                                    fmt::join(names_of(scene.cameras), ", "),
+                                    fmt::join(names_of(scene.lidars), ", "));
+             })
         .def_property_readonly(
             "bodies", [](const SceneSession& s) { return names_of(s.scene().bodies); },
             "Names, in the order of the AOV `body`.")

@@ -55,4 +55,6 @@ def dumps(document):
 
 def overrides_of(values):
     """{"sun.irradiance_w_m2": 1000} as KEY=VALUE of `--set`: a str is the VALUE itself, everything else is written as TOML."""
+    if not isinstance(values or {}, Mapping):
+        raise TypeError(f'overrides: expected a dict such as {{"camera.nav.detector.exposure_s": 0.002}}, not {type(values).__name__}')
     return [f"{key}={value if isinstance(value, str) else value_text(value)}" for key, value in (values or {}).items()]

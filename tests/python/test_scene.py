@@ -150,6 +150,9 @@ class Dictionaries(InAFolder):
                                  folder=program.SCENE.parent)  # fmt: skip
         self.assertEqual(scene.render().dn.shape, (60, 80))
         np.testing.assert_allclose(scene.pose("ball")[:3, 3], (0.3, 0, 3))
+        self.assertEqual(repr(scene), f'<narpa.Scene "{scene.name}": bodies {scene.bodies}, cameras {scene.cameras}, lidars {scene.lidars}>'.replace("'", ""))
+        with self.assertRaisesRegex(TypeError, "overrides: expected a dict such as"):
+            narpa.load_scene(document, ["camera.nav.resolution=[80, 60]"], folder=program.SCENE.parent)
 
 
 class Errors(InAFolder):

@@ -101,7 +101,7 @@ void BatchFrameFeed::observe_brightness(const BatchResult& found, BatchInput& in
         auto state = std::ranges::upper_bound(found.states, frame.time.t_ns, {}, &BatchState::t_ns);
         if (state != found.states.begin()) --state;
         Rigid3 T = inverse(T_chaser_camera) * state->T_chaser_target;
-        T.t = T.t / (1 + at(change, BatchUnknown::scale));  // a larger target looks the same as much further away
+        T.t = T.t / (1 + at(change, BatchUnknown::scale));  // units of the model (sensor_geometry.h)
         settings.frame = kept_[i].ledger.frame;  // errors of samples that frames share would not average out
         frame.brightness = narpa::observe_brightness(
             model_.render_scene(), camera, tracker_->target(), kept_[i].at, *image, T, settings,

@@ -133,6 +133,51 @@ TEST(PointSpreadFunction, AFlatImageStaysFlatUpToItsBorder) {
     for (const Rgb& v : out.pixels) EXPECT_NEAR(v.x, 2, 1e-5);
 }
 
+/// The sum of the filter's products, pixel by pixel; beyond the image its border is repeated.
+RadianceImage convolution(const SeparableFilter& filter, const RadianceImage& in) {
+    RadianceImage out(in.width, in.height);
+    const int r = filter.radius;
+    for (int y = 0; y < in.height; ++y)
+        for (int x = 0; x < in.width; ++x) {
+            Vec3 sum;
+            for (int j = -r; j <= r; ++j)
+                for (int i = -r; i <= r; ++i) {
+                    double weight = 0;
+                    for (const auto& term : filter.terms)
+                        weight += static_cast<double>(term.column[static_cast<std::size_t>(r + j)]) *
+                                  static_cast<double>(term.row[static_cast<std::size_t>(r + i)]);
+                    const int px = std::clamp(x - i, 0, in.width - 1), py = std::clamp(y - j, 0, in.height - 1);
+                    sum = sum + weight * vec_cast<double>(in.pixels[static_cast<std::size_t>(py * in.width + px)]);
+                }
+            out.pixels[static_cast<std::size_t>(y * in.width + x)] = vec_cast<float>(sum);
+        }
+    return out;
+}
+
+TEST(PointSpreadFunction, IsTheConvolutionOfEachImageWithItsFilter) {
+    PointSpreadImage comet{.width = 5, .height = 3, .centre_x = 1, .centre_y = 1, .samples = {}};
+    comet.samples = {0, 0.1, 0, 0, 0, 0.1, 0.4, 0.2, 0.1, 0, 0, 0, 0.1, 0, 0};
+    for (const PointSpreadFunction& spread :
+         {PointSpreadFunction{.cutoff_per_px = 1.1},
+          PointSpreadFunction{.image = std::make_shared<const PointSpreadImage>(comet)}}) {
+        Camera c = camera(150, 40, 100);
+        c.optics.point_spread = spread;
+        ImageOptics optics(c.optics, c.plane());
+        // Light at one corner, in the middle, at the other corner, and nowhere: what was lit is dark again.
+        for (const auto& [left, top] :
+             {std::pair(0, 0), std::pair(70, 18), std::pair(146, 36), std::pair(150, 40)}) {
+            RadianceImage in(150, 40), out(150, 40);
+            for (int y = top; y < std::min(top + 4, 40); ++y)
+                for (int x = left; x < std::min(left + 4, 150); ++x)
+                    in.pixels[static_cast<std::size_t>(y * 150 + x)] = {1.0f + static_cast<float>(x % 3), 2, 0.5f};
+            optics.apply(in, out);
+            const RadianceImage wanted = convolution(filter_of(spread), in);
+            for (std::size_t i = 0; i < out.pixels.size(); ++i)
+                ASSERT_LT(norm(out.pixels[i] - wanted.pixels[i]), 2e-6f) << left << ": pixel " << i;
+        }
+    }
+}
+
 TEST(PointSpreadFunction, IsTheSameOnAnyNumberOfThreads) {
     Camera c = camera(65, 50, 100);
     c.optics.point_spread = PointSpreadFunction{.cutoff_per_px = 0.5};

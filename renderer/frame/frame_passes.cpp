@@ -119,10 +119,13 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
         [&](const tbb::blocked_range<std::size_t>& one) {
             if (stop.load(std::memory_order_relaxed)) return;
             const FlushDenormals flush;
-            if (f.parts == LightParts::direct)
-                over_chunk(one.begin(), Worker::Storage<1>());
-            else
-                over_chunk(one.begin(), Worker::Storage<kMaxBatches>());
+            if (f.parts == LightParts::direct) {
+                Worker::Storage<1> storage;
+                over_chunk(one.begin(), storage);
+            } else {
+                Worker::Storage<kMaxBatches> storage;  // a megabyte: not cleared
+                over_chunk(one.begin(), storage);
+            }
         },
         tbb::simple_partitioner());
     PassCount sum;

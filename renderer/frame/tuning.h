@@ -37,17 +37,18 @@ inline constexpr double kMaxPilotPrediction = 0.85;
 inline constexpr std::uint64_t kPilotPart = 16;
 /// Light by paths with separate direct sunlight is sampled uniformly if this many samples of each pixel fit, by
 /// contrast with fewer. RMSE by contrast and uniformly, over that of one sample per pixel, at 3 and 4 times its
-/// rays: craft-paths 0.56 and 0.59, 0.47 and 0.47.
-inline constexpr std::uint64_t kUniformSamples = 3;
+/// rays: craft-paths 0.56 and 0.59, 0.47 and 0.47. RMSE of craft-and-ball at 12 rays per pixel: 2.8 and 4.5.
+inline constexpr std::uint64_t kUniformSamples = 4;
 /// With fewer rays for each pixel, paths for one pixel in 4 x 4 are not expected to fit.
 inline constexpr double kMinRaysOfPaths = 0.15;
 
 /// Separate direct sunlight gets samples of its own, with this fraction of the budget, if the budget has this many
-/// rays or samples per pixel and the sunlight of this fraction of the surfaces is separate. craft-paths at 256 x
-/// 256: RMSE 2.336 -> 1.974 at 16 rays per pixel, 0.977 -> 0.880 at 64; with less than 20 rays per pixel in view no
-/// gain.
+/// rays or samples per pixel in view and the sunlight of this fraction of the surfaces is separate. RMSE with 20
+/// and with 12 at 13 to 19 rays per pixel: craft-paths 5.5 -> 5.0, 5.2 -> 4.5, 4.5 -> 4.2; craft-and-ball 3.9 ->
+/// 3.3, 3.1 -> 2.7; with 10 it rises at 11 rays per pixel of a craft over a globe. A fraction of 0.4 has up to 1.4
+/// times the RMSE.
 inline constexpr double kSunlightPart = 0.22;
-inline constexpr double kMinRaysForSunlight = 20, kMinSamplesForSunlight = 6;
+inline constexpr double kMinRaysForSunlight = 12, kMinSamplesForSunlight = 4;
 inline constexpr double kMinSeparate = 0.5;
 
 /// Time reserved for waking the threads and for a preempted one: the larger of kMinSlack_ns and 1/kSlackPart of the

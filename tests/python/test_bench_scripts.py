@@ -1,7 +1,8 @@
-"""The scripts of bench/ in Python: they run on tiny scenes."""
+"""The scripts of bench/ that compare narpa with other renderers and measure how its cost grows: they run on tiny scenes."""
 import importlib
 import json
 import math
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -11,13 +12,16 @@ from pathlib import Path
 import needs
 
 needs.compiled()
-needs.modules("matplotlib")
+needs.modules("cv2", "matplotlib")
 
 import narpa
+import numpy as np
 
 BENCH = Path(__file__).resolve().parents[2] / "bench"
 BUILD = Path(narpa.__file__).parents[2]  # not resolved: the modules are links to the sources
 sys.path.insert(0, str(BENCH))
+scenes = importlib.import_module("beside.scenes")
+peers = importlib.import_module("peers")
 cost_laws = importlib.import_module("cost_laws")
 
 
@@ -29,6 +33,33 @@ def run(script, *arguments):
                               capture_output=True, text=True)  # fmt: skip
         assert picture.exists() == found.exists(), done.stderr
         return done.returncode, done.stderr, json.loads(found.read_text()) if found.exists() else None
+
+
+class Peers(unittest.TestCase):
+    def test_the_sphere_of_the_scenes_is_closed_and_faces_outwards(self):
+        vertices, faces = scenes.icosphere(3)
+        corners = vertices[faces]
+        volume = np.linalg.det(corners).sum() / 6
+        self.assertAlmostEqual(volume, 4 / 3 * math.pi, delta=0.05)
+        self.assertEqual(len(vertices), len(faces) // 2 + 2)
+
+    def test_time_for_an_error_is_interpolated_in_logarithms(self):
+        rows = [{"rmse_percent": 8.0, "cpu_s": 1.0}, {"rmse_percent": 2.0, "cpu_s": 16.0}]
+        self.assertAlmostEqual(peers.time_at(rows, 4.0, "cpu_s"), 4.0)
+        self.assertIsNone(peers.time_at(rows, 9.0, "cpu_s"))
+
+    def test_a_rung_that_a_cheaper_one_beats_does_not_count(self):
+        rows = [{"rmse_percent": e, "cpu_s": t} for e, t in ((8.0, 1.0), (20.0, 3.0), (2.0, 16.0))]
+        self.assertAlmostEqual(peers.time_at(rows, 4.0, "cpu_s"), 4.0)
+        self.assertIsNone(peers.time_at(rows, 9.0, "cpu_s"))
+
+    def test_the_converged_images_of_cycles_and_narpa_agree(self):
+        if not shutil.which("blender"):
+            self.skipTest("no blender")
+        status, errors, found = run("peers.py", "--scenes", "cornell")
+        self.assertEqual(status, 0, errors)
+        self.assertLess(abs(found["mean_difference_percent"]["cornell"]["Cycles"][0]), 5)  # of few samples
+        self.assertEqual({row["program"] for row in found["rows"]}, {"narpa", "Cycles"})
 
 
 class CostLaws(unittest.TestCase):

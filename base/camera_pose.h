@@ -4,7 +4,7 @@
 /// its last row ends.
 #pragma once
 
-#include "base/pose.h"
+#include "base/pose_path.h"
 
 namespace narpa {
 
@@ -12,15 +12,13 @@ class CameraPose {
 public:
     /// A picture of one moment: all rays are taken at mid-exposure, from here.
     CameraPose(const Rigid3& T_world_camera = {})  // NOLINT(google-explicit-constructor)
-        : start_(T_world_camera), end_(T_world_camera), middle_(T_world_camera) {}
+        : path_(T_world_camera), middle_(T_world_camera) {}
     /// A picture taken over time, also of bodies that move. The camera's centre moves along a straight line and the
     /// camera turns about a fixed axis, both at constant rates. `row_time` is the time from the start of one row's
     /// exposure to the start of the next: 0 for a global shutter, above that a rolling shutter, at most
     /// 1 / (rows - 1), where each row is exposed for a moment only.
     CameraPose(const Rigid3& start, const Rigid3& end, double row_time = 0)
-        : start_(start), end_(end), row_time_(row_time), over_time_(true), moves_(!(start == end)) {
-        middle_ = moves_ ? interpolated(0.5) : start;
-    }
+        : path_(start, end), middle_(path_.at(0.5)), row_time_(row_time), over_time_(true) {}
 
     /// When the exposure begins and ends on the simulation clock, and the camera's velocity in the world, for
     /// stars: they turn with the clock, and are displaced by aberration. 0 where not set.
@@ -31,8 +29,9 @@ public:
     [[nodiscard]] const Vec3& velocity_m_s() const noexcept { return velocity_m_s_; }
 
     [[nodiscard]] bool over_time() const noexcept { return over_time_; }
-    [[nodiscard]] bool moves() const noexcept { return moves_; }
-    [[nodiscard]] Rigid3 at(double time) const noexcept { return moves_ ? interpolated(time) : middle_; }
+    [[nodiscard]] bool moves() const noexcept { return path_.moves(); }
+    [[nodiscard]] const PosePath& path() const noexcept { return path_; }
+    [[nodiscard]] Rigid3 at(double time) const noexcept { return path_.at(time); }
     /// At mid-exposure.
     [[nodiscard]] const Rigid3& middle() const noexcept { return middle_; }
 
@@ -42,15 +41,12 @@ public:
     }
 
 private:
-    [[nodiscard]] Rigid3 interpolated(double time) const noexcept {
-        return {slerp(start_.q, end_.q, time), start_.t + time * (end_.t - start_.t)};
-    }
-
-    Rigid3 start_, end_, middle_;
+    PosePath path_;
+    Rigid3 middle_;
     double row_time_ = 0;
     double start_s_ = 0, end_s_ = 0;
     Vec3 velocity_m_s_{};
-    bool over_time_ = false, moves_ = false;
+    bool over_time_ = false;
 };
 
 }  // namespace narpa

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "base/pose.h"
+#include "base/pose_path.h"
 #include "renderer/geometry/body_tree.h"
 
 namespace narpa {
@@ -24,15 +24,17 @@ public:
 
     /// Whether any body, or this one, moves within the exposure.
     [[nodiscard]] bool moving() const noexcept { return moving_ > 0; }
-    [[nodiscard]] bool moves(std::size_t body) const noexcept { return moving_ > 0 && paths_[body].moves; }
+    [[nodiscard]] bool moves(std::size_t body) const noexcept { return moving_ > 0 && paths_[body].moves(); }
     /// Exactly the start pose at 0 and the end pose at 1.
     [[nodiscard]] Rigid3 T_world_body_at(std::size_t body, double time) const noexcept {
-        return moves(body) ? paths_[body].pose_at(time) : T_world_body[body];
+        return moves(body) ? paths_[body].at(time) : T_world_body[body];
     }
     /// Position of the body's origin, world.
     [[nodiscard]] Vec3 position_at(std::size_t body, double time) const noexcept {
         return moves(body) ? paths_[body].position_at(time) : T_world_body[body].t;
     }
+
+    [[nodiscard]] const PosePath& path(std::size_t body) const noexcept { return paths_[body]; }
 
     std::vector<Rigid3> T_world_body;  ///< at mid-exposure; changed by `set`
 
@@ -41,29 +43,17 @@ public:
     [[nodiscard]] const BodyTree& tree() const noexcept { return tree_; }
 
 private:
-    struct Path {
-        Rigid3 start, end;
-        bool moves = false;
-
-        [[nodiscard]] Vec3 position_at(double time) const noexcept {
-            return time == 1 ? end.t : start.t + time * (end.t - start.t);
-        }
-        [[nodiscard]] Rigid3 pose_at(double time) const noexcept {
-            return {time == 0 ? start.q : time == 1 ? end.q : slerp(start.q, end.q, time), position_at(time)};
-        }
-    };
-
-    std::vector<Path> paths_;
+    std::vector<PosePath> paths_;
     std::size_t moving_ = 0;  ///< bodies that move
     BodyTree tree_;
 };
 
 inline void BodyPoses::set(std::size_t body, const Rigid3& start, const Rigid3& end) noexcept {
-    Path& path = paths_[body];
-    moving_ -= path.moves ? 1 : 0;
-    path = {start, end, !(start == end)};
-    moving_ += path.moves ? 1 : 0;
-    T_world_body[body] = path.moves ? path.pose_at(kMidExposure) : start;
+    PosePath& path = paths_[body];
+    moving_ -= path.moves() ? 1 : 0;
+    path = {start, end};
+    moving_ += path.moves() ? 1 : 0;
+    T_world_body[body] = path.at(kMidExposure);
     tree_.clear();
 }
 

@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "base/pose_path.h"
 #include "tests/support/oracle.h"
 
 namespace narpa {
@@ -122,6 +123,36 @@ TEST(Slerp, EndsMiddleAndRate) {
             EXPECT_NEAR(norm(slerp(a, b, 0.6)), 1, 1e-15);
         }
     }
+}
+
+TEST(PosePath, TurnsAtAConstantRate) {
+    Seeded s(1);
+    for (const double angle : {1e-9, 1e-4, 1.9e-3, 2.1e-3, 0.03, 0.4, 1.5, 3.0, kPi - 1e-6})
+        for (int i = 0; i < 50; ++i) {
+            const Quat start = s.attitude(), end = start * exp_rotation(angle * s.axis());
+            for (const Quat& q : {end, -end}) {
+                const PosePath path({start, {}}, {q, {}});
+                EXPECT_NEAR(path.angle_rad(), angle, 2e-15);
+                for (const double time : {0.0, 0.1, 0.5, 0.77, 1.0}) {
+                    const Quat at = path.at(time).q;
+                    EXPECT_NEAR(norm(at), 1, 1e-15);
+                    EXPECT_NEAR(angle_between(start, at), time * angle, 2e-15) << angle << " at " << time;
+                    EXPECT_NEAR(angle_between(at, q), (1 - time) * angle, 2e-15) << angle << " at " << time;
+                }
+            }
+        }
+}
+
+TEST(PosePath, KeepsItsEndsBitForBit) {
+    const Rigid3 start{normalized(Quat{0.3, -0.5, 0.7, 0.1}), {7e6, -3, 0.1}};
+    const Rigid3 end{normalized(Quat{-0.3, 0.4, 0.7, 0.2}), {7e6 + 0.3, 5, 0.7}};
+    EXPECT_EQ(PosePath(start, end).at(0), start);
+    EXPECT_EQ(PosePath(start, end).at(1), end);
+    EXPECT_TRUE(PosePath(start, end).moves());
+    EXPECT_FALSE(PosePath(start).moves());
+    EXPECT_EQ(PosePath(start).at(0.3), start);
+    EXPECT_EQ(PosePath(start).angle_rad(), 0);
+    EXPECT_LT(norm(PosePath(start, end).at(0.25).t - Vec3{7e6 + 0.075, -1, 0.25}), 1e-9);
 }
 
 TEST(Slerp, ExtrapolatesAtTheSameRate) {

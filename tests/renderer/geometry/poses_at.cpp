@@ -5,7 +5,7 @@
 namespace narpa {
 namespace {
 
-/// Turns whose series is used, and some whose is not; signs that differ; a body at rest.
+/// Turns whose series has one term, and more; signs that differ; a body at rest.
 TEST(PosesAt, AreThoseOfEachMoment) {
     const Rigid3 start{normalized(Quat{0.3, -0.5, 0.7, 0.1}), {7e6, -3, 0.1}};
     Lanes<double> time;
@@ -23,6 +23,9 @@ TEST(PosesAt, AreThoseOfEachMoment) {
                 EXPECT_EQ(poses[i], at.T_world_body_at(0, time[i])) << angle << " at " << time[i];
                 EXPECT_EQ(positions[i], at.position_at(0, time[i]));
             }
+            const PosePath path(at.path(0).start(), at.path(0).end());
+            poses_at(path, time, poses);
+            for (std::size_t i = 0; i < kLanes; ++i) EXPECT_EQ(poses[i], path.at(time[i]));
         }
 }
 

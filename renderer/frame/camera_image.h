@@ -30,8 +30,8 @@ namespace narpa {
 /// and so upper bounds, because a filter averages noise.
 ///
 /// A camera that moves within the exposure, or bodies that move in an image taken over time (CameraPose), cause
-/// motion blur: each sample takes its own time, and one sample per pixel the middle of its row's exposure. Tile
-/// culling, sampling of subpixel bodies and, where bodies move, path reuse are then off.
+/// motion blur: each sample takes its own time, and one sample per pixel the middle of its row's exposure. Sampling
+/// of subpixel bodies and, where bodies move, path reuse are then off.
 ///
 /// Runs on the calling thread's TBB arena. Same bytes on any number of threads. Allocates its memory with each
 /// call; for many frames use CameraRenderer. `aovs` may be null; they show a pinhole's view, subpixel bodies

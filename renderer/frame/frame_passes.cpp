@@ -28,10 +28,11 @@ public:
         everywhere_ = f.render_scene.lights().any_with_extent() || !f.render_scene.background().uniform() ||
                       f.render_scene.medium() != nullptr;
         if (f.transport.path.direct || !f.sun || f.sun->is_point()) return;
-        // Generous upper bounds of the Sun's angular radius and of the deflection of rays by the lens.
+        // Generous upper bounds of the Sun's angular radius, of the deflection of rays by the lens and of the
+        // camera's rotation from the pose at mid-exposure.
         const double disc_rad = f.tracer.scene().sun->angular_diameter_rad;
         const double lens_rad = lens != nullptr ? lens->aperture_diameter_m / lens->focus_distance_m : 0;
-        within_rad_ = disc_rad + lens_rad;
+        within_rad_ = disc_rad + lens_rad + f.pose.path().angle_rad();
         sun_ = true;
     }
     /// True if rays through the tile at pixel (x, y) may meet an emitter.
@@ -138,8 +139,8 @@ PassCount FramePasses::over_tiles(const Frame& f, Sums sums, const PassLimit& li
 void FramePasses::begin(const Frame& f, const Lens* lens) {
     find_background(f);
     g_buffer_.begin_frame(background_, f.parts);
-    if (f.settings.mechanisms.tile_culling && !f.over_time)
-        culling_.update(f.at, f.T_world_camera, lens);
+    if (f.settings.mechanisms.tile_culling)
+        culling_.update(f.at, f.pose, lens);
     else
         culling_.list_all();
     const EmittersInView emitters(f, lens);
@@ -147,7 +148,7 @@ void FramePasses::begin(const Frame& f, const Lens* lens) {
     pixels_ = 0;
     for (std::uint32_t i = 0; i < g_buffer_.tiles(); ++i) {
         const Tile t = tile(i);
-        if (t.bodies.empty() && !f.over_time && !emitters.any(t.x, t.y)) continue;
+        if (t.bodies.empty() && !emitters.any(t.x, t.y)) continue;
         tiles_.push_back(i);
         g_buffer_.set_traced(i);
         pixels_ += static_cast<std::uint64_t>(t.width * t.height);

@@ -68,7 +68,7 @@ STAGES = [
      {"body": TURNING}),
 ]  # fmt: skip
 FUNCTIONS = ("ImageOptics::", "SunGhost::", "BrownConrady::", "KannalaBrandt::", "TabulatedModel::", "filter_of", "lens_direction", "StarLight::", "PointResponse::",
-             "read_out", "CameraControl::")
+             "read_out", "CameraControl::", "mark_swept", "random_times", "move_camera")
 
 
 def coma_image():

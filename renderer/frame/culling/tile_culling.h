@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "base/camera_pose.h"
 #include "renderer/frame/culling/body_culling.h"
 #include "renderer/geometry/tracer.h"
 
@@ -22,8 +23,9 @@ public:
 
     /// Updates the lists for these poses. Conservative: if a ray through any point of a tile and of the lens (null:
     /// a pinhole) meets a body, the body is in the tile's list, also if it is as near as the camera, partly behind
-    /// it, or around it. Allocates nothing.
-    void update(const BodyPoses& at, const Rigid3& T_world_camera, const Lens* lens) noexcept;
+    /// it, or around it. Of a picture taken over time: if it does so at any time of the exposure of the tile's
+    /// rows. Allocates nothing.
+    void update(const BodyPoses& at, const CameraPose& camera, const Lens* lens) noexcept;
     /// Lists all bodies in every tile: no culling.
     void list_all() noexcept;
 
@@ -36,6 +38,10 @@ public:
     [[nodiscard]] int tiles_y() const noexcept { return tiles_y_; }
 
 private:
+    /// Marks the tiles that may show the body, which is here with its points at most `sweep_m` away.
+    void mark(std::uint32_t body, const BodyView& view, double sweep_m, const Lens* lens) noexcept;
+    /// The same for a body that moves in camera axes within the exposure.
+    void mark_swept(std::uint32_t body, const BodyPoses& at, const CameraPose& camera, const Lens* lens) noexcept;
     void list(std::uint32_t body) noexcept;
     [[nodiscard]] std::size_t index(int tile_x, int tile_y) const noexcept {
         return static_cast<std::size_t>(tile_y) * static_cast<std::size_t>(tiles_x_) +

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "base/constants.h"
 #include "renderer/camera/scene_camera.h"
 #include "renderer/geometry/ellipsoid.h"
 #include "renderer/geometry/mesh_shape.h"
@@ -121,17 +122,25 @@ struct Tally {
     std::size_t met = 0, missed = 0;
 };
 
+/// Of a ray of a picture taken over time; one in three is next to its start or its end.
+double random_time(Random& random) {
+    const double time = uniform(random, 0, 1);
+    return time < 1.0 / 6 ? 1e-3 * time : time > 5.0 / 6 ? 1 - 1e-3 * (1 - time) : time;
+}
+
 /// Rays through random points of the image and of the lens, half of them through its rim.
 Tally send_rays(const Tracer& tracer, const Camera& camera, const TileCulling& cover, const BodyPoses& at,
-                const Rigid3& T_world_camera, const Lens* lens, int rays, Random& random) {
+                const CameraPose& camera_pose, const Lens* lens, int rays, Random& random) {
     Tally tally;
     for (int i = 0; i < rays; ++i) {
+        const double time = camera_pose.over_time() ? random_time(random) : kMidExposure;
+        const Rigid3 T_world_camera = camera_pose.at(time);
         const double x = uniform(random, -0.5, camera.width - 0.5), y = uniform(random, -0.5, camera.height - 0.5);
-        const Ray ray = lens != nullptr
-                            ? test::lens_ray(camera, *lens, T_world_camera, x, y,
-                                             aperture_point(*lens, uniform(random, 0, 1),
-                                                            i % 2 == 0 ? 0.999999 : uniform(random, 0, 1)))
-                            : camera_ray(camera, T_world_camera, x, y);
+        Ray ray = lens != nullptr ? test::lens_ray(camera, *lens, T_world_camera, x, y,
+                                                   aperture_point(*lens, uniform(random, 0, 1),
+                                                                  i % 2 == 0 ? 0.999999 : uniform(random, 0, 1)))
+                                  : camera_ray(camera, T_world_camera, x, y);
+        ray.time = time;
         const auto listed =
             cover.bodies(static_cast<int>((x + 0.5) / kTileSize), static_cast<int>((y + 0.5) / kTileSize));
         // The body behind the first one, too.
@@ -188,20 +197,134 @@ TEST(TileCulling, MissesNothingAtTheDistanceOfTheMoon) {
     expect_no_misses(4e8, true, 4);
 }
 
+/// Turned by up to `angle_rad` and moved by up to `way_m`.
+Rigid3 moved_randomly(const Rigid3& T, double angle_rad, double way_m, Random& random) {
+    return {normalized(exp_rotation(uniform(random, 0, angle_rad) * random_direction(random)) * T.q),
+            T.t + uniform(random, 0, way_m) * random_direction(random)};
+}
+
+/// Bodies and camera move within the exposure: some of them slowly, some by half a turn, some together.
+void expect_no_misses_in_motion(const Camera& camera, double far_m, bool with_lens, std::uint64_t seed) {
+    Random random(seed);
+    const Scene scene = mixed_scene(random);
+    const Tracer tracer = tracer_of(scene);
+    TileCulling cover(tracer, camera);
+    BodyPoses at(scene.bodies.size());
+    Tally all;
+    for (int pose = 0; pose < 50; ++pose) {
+        const Rigid3 start{random_attitude(random), far_m * random_direction(random)};
+        place_about(tracer, start, camera, random, at);
+        const Vec3 together = pose % 3 == 0 ? 70.0 * random_direction(random) : Vec3{};
+        Rigid3 end = pose % 4 == 0 ? start : moved_randomly(start, std::exp(uniform(random, -8, 0.5)), 0.1, random);
+        end.t += together;
+        for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+            const Rigid3 from = at.T_world_body[b];
+            const double size_m = tracer.bounding_radius_m(b);
+            Rigid3 to = b % 4 == 0 ? from
+                                   : moved_randomly(from, std::exp(uniform(random, -8, 1.2)),
+                                                    size_m * std::exp(uniform(random, -6, 1)), random);
+            to.t += together;
+            at.set(b, from, to);
+        }
+        const Lens lens{std::exp(uniform(random, -7, 0)), std::exp(uniform(random, 0, 5))};
+        const CameraPose camera_pose(start, end);
+        cover.update(at, camera_pose, with_lens ? &lens : nullptr);
+        const Tally t =
+            send_rays(tracer, camera, cover, at, camera_pose, with_lens ? &lens : nullptr, 1500, random);
+        all.met += t.met, all.missed += t.missed;
+    }
+    EXPECT_EQ(all.missed, 0u) << "of " << all.met;
+    EXPECT_GT(all.met, 20'000u);
+}
+
+TEST(TileCulling, MissesNothingThatMoves) {
+    for (const double f_px : {60.0, 200.0, 3000.0})
+        expect_no_misses_in_motion(camera_of(150, 115, f_px), 0, false, static_cast<std::uint64_t>(f_px));
+    expect_no_misses_in_motion(camera_of(150, 115, 200), 0, true, 11);
+    expect_no_misses_in_motion(camera_of(150, 115, 200), 4e8, false, 12);
+}
+
+// Bodies of 0.02 px that move by up to 8 px, or that the camera moves past: nothing is to spare at the ends of the
+// exposure.
+TEST(TileCulling, SweepsToTheEndsOfAMotion) {
+    enum Kind { body_moves, camera_moves, camera_turns, body_turns, kinds };
+    constexpr double kSize_m = 0.002, kArm_m = 10, kDistance_m = 20;
+    Random random(9);
+    Scene scene;
+    scene.materials.emplace_back();
+    scene.meshes = {tube(kSize_m, kSize_m, 6)};
+    for (Vec3f& p : scene.meshes[0].positions) p.x += static_cast<float>(kArm_m);
+    scene.bodies = {{.name = "sphere", .shape = exact_sphere(kSize_m)}, {.name = "on an arm", .shape = 0}};
+    const Tracer tracer = tracer_of(scene);
+    const Camera camera = camera_of(150, 115, 200);
+    TileCulling cover(tracer, camera);
+    for (int kind = 0; kind < kinds; ++kind) {
+        std::size_t seen = 0, missed = 0;
+        for (int trial = 0; trial < 2000; ++trial) {
+            const double direction = uniform(random, 0, 2 * kPi), way_m = uniform(random, 0.3, 0.7);
+            const Vec3 along{std::cos(direction), std::sin(direction), 0};
+            const Vec3 axis{-along.y, along.x, 0};
+            const Vec3 place{uniform(random, -6, 6), uniform(random, -5, 5), kDistance_m};
+            BodyPoses at(2);
+            for (std::size_t b = 0; b < 2; ++b) at.set(b, {{}, {0, 0, -100}});
+            Rigid3 end;
+            const std::uint32_t body = kind == body_turns ? 1 : 0;
+            if (kind == body_turns) {
+                const Quat start = exp_rotation({0, 0, direction});
+                at.set(1, {start, place - kArm_m * along},
+                       {exp_rotation({0, 0, way_m / kArm_m}) * start, place - kArm_m * along});
+            } else {
+                at.set(0, {{}, place}, {{}, kind == body_moves ? place + way_m * along : place});
+            }
+            if (kind == camera_moves) end.t = way_m * along;
+            if (kind == camera_turns) end.q = exp_rotation(way_m / kDistance_m * axis);
+            const CameraPose camera_pose({}, end);
+            cover.update(at, camera_pose, nullptr);
+            for (const double time : {0.0, 1.0}) {
+                const Vec3 world = at.T_world_body_at(body, time) * Vec3{body == 1 ? kArm_m : 0, 0, 0};
+                const auto p = camera.model->project(inverse(camera_pose.at(time)) * world);
+                if (!p || p->x < -0.5 || p->y < -0.5 || p->x > 149.5 || p->y > 114.5) continue;
+                const auto listed = cover.bodies(static_cast<int>((p->x + 0.5) / kTileSize),
+                                                 static_cast<int>((p->y + 0.5) / kTileSize));
+                ++seen;
+                missed += std::ranges::count(listed, body) == 0;
+            }
+        }
+        EXPECT_EQ(missed, 0u) << kind << ": of " << seen;
+        EXPECT_GT(seen, 3000u);
+    }
+}
+
+TEST(TileCulling, MissesNothingThatMovesBeforeADistortingLens) {
+    Camera camera = camera_of(150, 115, 100);
+    camera.model = test::brown_conrady(test::pinhole_of(camera), {-0.2, 0.05, 1e-3, 1e-3, 0});
+    expect_no_misses_in_motion(camera, 0, false, 13);
+    camera.model = test::kannala_brandt({80, 80, 74.5, 57}, {-0.02, 0.004, 0, 0});
+    expect_no_misses_in_motion(camera, 0, true, 14);
+}
+
 /// Pixels that a body covers, pixels of the tiles that these are in, and of those that the cover marks.
 struct Areas {
     int covered = 0, needed = 0, marked = 0;
 };
 
-Areas areas_of(const Tracer& tracer, const Camera& camera, const BodyPoses& at) {
+Areas areas_of(const Tracer& tracer, const Camera& camera, const BodyPoses& at,
+               const CameraPose& camera_pose = {}) {
     TileCulling cover(tracer, camera);
-    cover.update(at, {}, nullptr);
+    cover.update(at, camera_pose, nullptr);
+    const int times = camera_pose.over_time() ? 12 : 0;  // parts of the exposure
     Areas a;
     std::vector<int> covered_in(static_cast<std::size_t>(cover.tiles_x() * cover.tiles_y()), 0);
     for (int y = 0; y < camera.height; ++y)
         for (int x = 0; x < camera.width; ++x) {
             const int tile_x = x / kTileSize, tile_y = y / kTileSize;
-            const int covered = tracer.intersect(at, camera_ray(camera, {}, x, y), 1e300).body >= 0 ? 1 : 0;
+            int covered = 0;
+            for (int k = 0; covered == 0 && k <= times; ++k) {
+                const double time = times > 0 ? static_cast<double>(k) / times : kMidExposure;
+                Ray ray = camera_ray(camera, camera_pose.at(time), x, y);
+                ray.time = time;
+                covered = tracer.intersect(at, ray, 1e300).body >= 0 ? 1 : 0;
+            }
             a.covered += covered;
             covered_in[static_cast<std::size_t>(tile_y * cover.tiles_x() + tile_x)] += covered;
             a.marked += cover.bodies(tile_x, tile_y).empty() ? 0 : 1;
@@ -255,6 +378,29 @@ TEST(TileCulling, MarksLittleMoreThanBodiesCover) {
         EXPECT_LE(sum.marked, (exact ? 1.05 : 1.3) * sum.needed) << scene.bodies[body].name;
         EXPECT_LE(sum.marked, (body == 1 ? 1.45 : 1.3) * sum.covered) << scene.bodies[body].name;
     }
+}
+
+// Moves by 40 px, by 300 px (more than the sweep is divided for), turns by a quarter; the camera turns by 40 px.
+TEST(TileCulling, MarksLittleMoreThanMovingBodiesSweep) {
+    const Camera camera = camera_of(512, 512, 500);
+    Scene scene;
+    scene.materials.emplace_back();
+    scene.meshes = {station()};
+    scene.bodies = {{.name = "station", .shape = 0}};
+    const Tracer tracer = tracer_of(scene);
+    const Rigid3 start{exp_rotation({0.4, 0.5, 0}), {0, 0, 30}};
+    const auto expect_tight = [&](const Rigid3& end, const CameraPose& camera_pose, double most) {
+        BodyPoses at(1);
+        at.set(0, start, end);
+        const Areas a = areas_of(tracer, camera, at, camera_pose);
+        EXPECT_GT(a.covered, 15'000);
+        EXPECT_LE(a.marked, most * a.needed) << a.needed;
+    };
+    const CameraPose still({}, {});
+    expect_tight({start.q, start.t + Vec3{2.4, 0, 0}}, still, 1.3);
+    expect_tight({start.q, start.t + Vec3{0, 18, 0}}, still, 1.6);
+    expect_tight({exp_rotation({0, 0, 1.5}) * start.q, start.t}, still, 1.7);
+    expect_tight(start, {{}, {exp_rotation({0, 0.08, 0}), {}}}, 1.3);
 }
 
 // A planet seen from low above it: the outline of its image is neither an ellipse nor wholly in front.

@@ -3,6 +3,7 @@
 #include <cassert>
 
 #include "base/each_isa.h"
+#include "renderer/geometry/poses_at.h"
 #include "renderer/integrator/batch_sampler.h"
 #include "renderer/integrator/path_dimensions.h"
 #include "renderer/optics/lens.h"
@@ -108,15 +109,37 @@ void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, TracedRays& p) 
     }
 }
 
-/// Moves rays from the camera's pose at mid-exposure to its pose at their own times. `u`: time within the exposure
-/// of their row, in [0, 1).
-void move_to_times(const Frame& f, const CameraSamples& s, const Lanes<double>& u, RayBatch& rays) noexcept {
-    for (std::size_t i = 0; i < s.n; ++i) {
-        const double time = f.pose.time(s.y[i], f.camera.height, u[i]);
-        const Rigid3 T = f.pose.at(time);
-        const Quat turn = T.q * conjugate(f.T_world_camera.q);
-        rays.put(i, {T.t + turn * (rays.origin[i] - f.T_world_camera.t), turn * rays.direction[i], time});
+NARPA_EACH_ISA void random_times(const Frame& f, const CameraSamples& s, Lanes<double>& u) noexcept {
+    sampler_of(f, s).first_dimension(kTimeGroup, u);
+}
+
+/// `u`: time within the exposure of each ray's row, in [0, 1).
+NARPA_EACH_ISA void set_times(const Frame& f, const CameraSamples& s, const Lanes<double>& u,
+                              Lanes<double>& time) noexcept {
+    const int rows = f.camera.height;
+    for (std::size_t i = 0; i < kLanes; ++i) time[i] = f.pose.time(s.y[i], rows, u[i]);
+}
+
+NARPA_EACH_ISA void move_camera(const Rigid3& from, const PoseLanes& to, RayBatch& rays) noexcept {
+    const Quat back = conjugate(from.q);
+    Vec3Lanes origin, direction;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const Rigid3 T = to[i];
+        const Quat turn = T.q * back;
+        origin.put(i, T.t + turn * (rays.origin[i] - from.t));
+        direction.put(i, turn * rays.direction[i]);
     }
+    rays.origin = origin;
+    rays.direction = direction;
+}
+
+/// Moves rays from the camera's pose at mid-exposure to its pose at their own times.
+void move_to_times(const Frame& f, const CameraSamples& s, const Lanes<double>& u, RayBatch& rays) noexcept {
+    set_times(f, s, u, rays.time);
+    if (!f.pose.moves()) return;
+    PoseLanes T_world_camera;
+    poses_at(f.pose.path(), rays.time, T_world_camera);
+    move_camera(f.T_world_camera, T_world_camera, rays);
 }
 
 }  // namespace
@@ -126,12 +149,9 @@ void aim_rays(const Frame& f, const CameraSamples& s, TracedRays& p) {
     PhaseClock clock(p.times);
     aim_at_mid_exposure(f, s, p);
     if (f.over_time) {
-        Points u;
-        if (s.centre && f.one_sample())
-            u[0] = kMidExposureLanes;
-        else
-            next_points(f, s, kTimeGroup, u);
-        move_to_times(f, s, u[0], p.rays);
+        Lanes<double> u = kMidExposureLanes;
+        if (!s.centre || !f.one_sample()) random_times(f, s, u);
+        move_to_times(f, s, u, p.rays);
     }
     p.number = s.number;
     p.sample = s.sample;

@@ -25,18 +25,31 @@ public:
     void points(Points& u) const noexcept { scrambled(sample_, key_, u); }
     /// Four further dimensions; group > 0.
     void points(std::uint32_t group, Points& u) const noexcept {
-        using namespace sampler_detail;
         Lanes<std::uint64_t> a;
-        for (std::size_t i = 0; i < kLanes; ++i)
-            a[i] = mix(((std::uint64_t{key_[1][i]} << 32) | key_[0][i]) + group);
         Lanes<std::uint32_t> shuffled;
-        for (std::size_t i = 0; i < kLanes; ++i)
-            shuffled[i] = scramble_reversed(reverse_bits(sample_[i]), static_cast<std::uint32_t>(mix(mix(a[i]))));
+        shuffle(group, a, shuffled);
         scrambled(shuffled, key_of(a), u);
+    }
+    /// Only the first of these dimensions. Sobol's first one is the index itself, bits reversed.
+    void first_dimension(std::uint32_t group, Lanes<double>& u) const noexcept {
+        Lanes<std::uint64_t> a;
+        Lanes<std::uint32_t> shuffled;
+        shuffle(group, a, shuffled);
+        for (std::size_t i = 0; i < kLanes; ++i)
+            u[i] = 0x1p-32 * sampler_detail::scramble_reversed(shuffled[i], static_cast<std::uint32_t>(a[i]));
     }
 
 private:
     using Keys = std::array<Lanes<std::uint32_t>, 4>;
+
+    /// Key of the group and index in it.
+    void shuffle(std::uint32_t group, Lanes<std::uint64_t>& a, Lanes<std::uint32_t>& shuffled) const noexcept {
+        using namespace sampler_detail;
+        for (std::size_t i = 0; i < kLanes; ++i)
+            a[i] = mix(((std::uint64_t{key_[1][i]} << 32) | key_[0][i]) + group);
+        for (std::size_t i = 0; i < kLanes; ++i)
+            shuffled[i] = scramble_reversed(reverse_bits(sample_[i]), static_cast<std::uint32_t>(mix(mix(a[i]))));
+    }
 
     static Keys key_of(const Lanes<std::uint64_t>& a) noexcept {
         Keys key;

@@ -83,6 +83,10 @@ TEST(BatchSampler, EqualsThePixelSamplers) {
                 const SamplePoint one = PixelSampler(seed, 5, pixel[i]).point(sample[i], group);
                 for (std::size_t dim = 0; dim < 4; ++dim) ASSERT_EQ(u[dim][i], one[dim]) << i << " " << dim;
             }
+            if (group == 0) continue;
+            Lanes<double> first;
+            sampler.first_dimension(group, first);
+            for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(first[i], u[0][i]);
         }
 }
 

@@ -82,10 +82,14 @@ NARPA_EACH_ISA void turn_moving(const WorldRays& rays, std::uint32_t leave, cons
     set_own_origins(rays, leave, local);
 }
 
-/// Transforms the rays to the frame of a body at each ray's time.
-void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, ShapeRays& local) {
-    if (at.moves(body) && !rays.same_time) {
-        PoseLanes T_world_body;
+bool moves_among(const BodyPoses& at, std::size_t body, const WorldRays& rays) {
+    return at.moves(body) && !rays.same_time;
+}
+
+/// Transforms the rays to the frame of a body at each ray's time. `T_world_body`: out, if it moves among the rays.
+void to_body(const BodyPoses& at, std::size_t body, const WorldRays& rays, std::uint32_t leave, ShapeRays& local,
+             PoseLanes& T_world_body) {
+    if (moves_among(at, body, rays)) {
         poses_at(at, body, rays.time, T_world_body);
         turn_moving(rays, leave, T_world_body, local);
     } else {
@@ -104,6 +108,16 @@ NARPA_EACH_ISA void turn_directions(const Quat& q_world_body, const Vec3Lanes& d
     for (std::size_t i = 0; i < kLanes; ++i) {
         const Vec3 d = choose(mine[i] != 0, directions[i], {0, 0, 1});
         turned.put(i, {dot(x, d), dot(y, d), dot(z, d)});
+    }
+}
+
+NARPA_EACH_ISA void turn_directions(const PoseLanes& T_world_body, const Vec3Lanes& directions,
+                                    std::uint32_t wanted, Vec3Lanes& __restrict turned) {
+    const Lanes<int> mine = masks_of(wanted);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        const auto [x, y, z] = columns(T_world_body[i].q);
+        const Vec3 d = directions[i];
+        turned.put(i, choose(mine[i] != 0, {dot(x, d), dot(y, d), dot(z, d)}, {0, 0, 1}));
     }
 }
 
@@ -168,16 +182,22 @@ public:
         for (const auto& [body, mine] : groups_) impl.shapes[body]->depart(from, mine, start_);
     }
 
-    /// The body that all rays leave, if it does not move; else the number of bodies.
+    /// The body that all rays leave; the number of bodies: they leave several.
     [[nodiscard]] std::size_t body_of_all() const noexcept {
         const auto& [body, mine] = *groups_.begin();
-        return mine == wanted_ && !at_.moves(body) ? body : impl_.shapes.size();
+        return mine == wanted_ ? body : impl_.shapes.size();
     }
     /// The lanes that hit this body, which all rays leave, before `t_max`: world axes are not needed.
     [[nodiscard]] std::uint32_t occluded_by(std::size_t body, const Lanes<double>& t_max,
                                             bool coherent) const noexcept {
         ShapeRays local;
-        turn_directions(at_.T_world_body[body].q, directions_, wanted_, local.direction);
+        if (at_.moves(body)) {
+            PoseLanes T_world_body;
+            poses_at(at_, body, from_.time, T_world_body);
+            turn_directions(T_world_body, directions_, wanted_, local.direction);
+        } else {
+            turn_directions(at_.T_world_body[body].q, directions_, wanted_, local.direction);
+        }
         local.origin = start_;
         local.entry_m.fill(0);
         local.t_max = t_max;
@@ -190,7 +210,7 @@ public:
     [[nodiscard]] WorldRays in_world(bool coherent) noexcept {
         own_.fill(-1);
         for_each_lane(wanted_, [&](std::size_t i) { own_[i] = from_.body[i]; });
-        if (const std::size_t own = body_of_all(); own < impl_.shapes.size()) {
+        if (const std::size_t own = body_of_all(); own < impl_.shapes.size() && !at_.moves(own)) {
             own_at_.fill(at_.T_world_body[own]);
         } else {
             own_at_ = {};
@@ -219,7 +239,8 @@ private:
 NARPA_EACH_ISA void Tracer::Impl::trace_body(const BodyPoses& at, const WorldRays& rays, std::uint32_t body,
                                              std::uint32_t wanted, ShapeRays& local,
                                              NearestHits& nearest) const noexcept {
-    to_body(at, body, rays, rays.that_leave(body), local);
+    to_body(at, body, rays, rays.that_leave(body), local, nearest.T_world_body);
+    nearest.posed = body;
     local.t_max = nearest.at.range_m;
     const std::uint32_t met = shapes[body]->intersect(local, wanted, nearest.at);
     if (met == 0) return;
@@ -232,7 +253,8 @@ NARPA_EACH_ISA void Tracer::Impl::trace_body(const BodyPoses& at, const WorldRay
 NARPA_EACH_ISA std::uint32_t Tracer::Impl::occluded_by(const BodyPoses& at, const WorldRays& rays,
                                                        std::uint32_t body, std::uint32_t entering,
                                                        ShapeRays& local) const noexcept {
-    to_body(at, body, rays, rays.that_leave(body), local);
+    PoseLanes T_world_body;
+    to_body(at, body, rays, rays.that_leave(body), local, T_world_body);
     return shapes[body]->occluded(local, entering);
 }
 
@@ -240,7 +262,7 @@ void Tracer::Impl::enter_body(const BodyPoses& at, const WorldRays& rays, std::u
                               Lanes<double>& entry_m) const noexcept {
     const std::uint32_t leave = rays.that_leave(body);
     const double bound_m = shapes[body]->properties().bound_m;
-    if (at.moves(body) && !rays.same_time) {
+    if (moves_among(at, body, rays)) {
         Vec3Lanes t;
         positions_at(at, body, rays.time, t);
         enter_moving(rays, leave, t, bound_m, entry_m);
@@ -329,8 +351,9 @@ NARPA_EACH_ISA void Tracer::Impl::finish(const BodyPoses& at, const WorldRays& r
     const auto& [first, firsts] = *groups.begin();
     shapes[first]->surface(nearest.at, firsts, hits);
     hits.outside &= nearest.met;
-    if (firsts == nearest.met && (rays.same_time || !at.moves(first)))
+    if (firsts == nearest.met && !moves_among(at, first, rays))
         return to_world(at.T_world_body_at(first, rays.time[0]), hits);
+    if (firsts == nearest.met && nearest.posed == first) return to_world(nearest.T_world_body, hits);
 
     PoseLanes T_world_body;
     HitBatch others;

@@ -32,11 +32,14 @@ struct WorldRays {
 /// The nearest hit of each ray so far.
 struct NearestHits {
     std::uint32_t met = 0;
-    Lanes<int> body;  ///< -1: none
-    ShapeHits at;     ///< infinite range: none
+    Lanes<int> body;                      ///< -1: none
+    ShapeHits at;                         ///< infinite range: none
+    std::size_t posed = ~std::size_t{0};  ///< the body that was traced last
+    PoseLanes T_world_body;               ///< its pose at each ray's time, if it moves among these
 
     void clear() noexcept {
         met = at.inner = 0;
+        posed = ~std::size_t{0};
         body.fill(-1);
         at.range_m.fill(kInfinity);
     }

@@ -1,6 +1,8 @@
 #include "renderer/lidar/beam_cone.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/each_isa.h"
@@ -25,6 +27,20 @@ BeamCone::BeamCone(double divergence_rad, int rays) : x_(static_cast<std::size_t
                      turn = 2 * std::numbers::pi * i / std::numbers::phi;
         x_[static_cast<std::size_t>(i)] = radius * std::cos(turn);
         y_[static_cast<std::size_t>(i)] = radius * std::sin(turn);
+    }
+    spread_the_first();
+}
+
+/// After the ray nearest to the axis, each is the one farthest from all before it (Gonzalez 1985).
+void BeamCone::spread_the_first() {
+    std::vector<double> nearest2(size(), std::numeric_limits<double>::infinity());
+    for (std::size_t n = 1; n < size(); ++n) {
+        for (std::size_t k = n; k < size(); ++k)
+            nearest2[k] = std::min(nearest2[k], std::pow(x_[k] - x_[n - 1], 2) + std::pow(y_[k] - y_[n - 1], 2));
+        const auto farthest = static_cast<std::size_t>(
+            std::max_element(nearest2.begin() + static_cast<std::ptrdiff_t>(n), nearest2.end()) - nearest2.begin());
+        std::swap(x_[n], x_[farthest]), std::swap(y_[n], y_[farthest]);
+        std::swap(nearest2[n], nearest2[farthest]);
     }
 }
 

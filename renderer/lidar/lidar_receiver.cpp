@@ -1,6 +1,7 @@
 #include "renderer/lidar/lidar_receiver.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -64,7 +65,13 @@ LidarReceiver::LidarReceiver(const Tracer& tracer, const Lidar& lidar, std::uint
       cone_(model_.beam_divergence_rad, model_.sub_rays),
       culling_(tracer, cone_.tangent(), shot_range_max_m_),
       met_(kLanes * cone_.size()),
-      multipath_(tracer, lidar, seed, index, cone_.size()) {}
+      multipath_(tracer, lidar, seed, index, cone_.size()) {
+    const bool small_parts_may_matter =
+        multipath_.is_on() ||
+        std::ranges::any_of(tracer.scene().materials, [](const Material& m) { return m.retroreflectance > 0; });
+    if (!small_parts_may_matter && cone_.size() <= std::size_t{LidarReceiverModel::kMaxSubRays})
+        probes_ = BeamProbes(cone_);
+}
 
 std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams, std::uint64_t first,
                                      std::span<const Motion> motions, std::span<LidarEchoes> echoes) noexcept {
@@ -75,19 +82,21 @@ std::uint32_t LidarReceiver::receive(const BodyPoses& at, const RayBatch& beams,
                                 .mount = mount_,
                                 .medium = medium_};
     Draws draws(*this, first);
-    const std::size_t sub_rays = cone_.size();
     const std::uint32_t meeting = culling_.find_meeting(at, beams);
     trace(at, beams, first, meeting, settings, draws);
     const bool sees_air = air_.is_possible() || (bright_air_ && reports_sunlight_);
     const std::uint32_t possible = sees_air ? lanes_below(beams.n) : meeting;
     for_each_lane(possible, [&](std::size_t i) {
         LidarEchoes& out = echoes[i] = {};
-        const auto met =
-            is_set(meeting, i) ? std::span(met_).subspan(first_[i], sub_rays) : std::span<LidarReturn>();
+        const auto met = is_set(meeting, i) ? met_by(i) : std::span<LidarReturn>();
         const double axis_m = met.empty() ? 0 : met.front().range_m;
         if (!met.empty()) out.sunlight = met.front().sunlight;
         EchoList list;
-        std::size_t n = part(met, list);
+        std::size_t n = 1;
+        if (!met.empty() && is_set(on_plane_, i))
+            list[0] = echo_of_plane(met, ratios_[i]);
+        else
+            n = part(met, list);
         if (n > 0 && multipath_.is_on()) n = add_multipath(multipath_.of_beam(first_[i]), list, n);
         if (n == 0 && !sees_air) return;
         if (bright_air_)
@@ -143,43 +152,72 @@ LidarReceiver::Echo LidarReceiver::air_echo(const BodyPoses& at, const Ray& beam
     return {light, range_m, dot(beam.direction, velocity)};
 }
 
-/// Sub-rays of a beam are nearly parallel, so they are traced in one batch, through the bodies that their beams may
-/// hit.
+/// Traces the beams `wanted`: the probes of all, where there are probes, and the other sub-rays of those whose
+/// probes do not lie on a plane.
 void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
-                          ShotSettings settings, Draws& draws) noexcept {
-    const std::size_t sub_rays = cone_.size();
-    Lanes<std::size_t> beam;
-    Lanes<BeamCone::Across> across{};
+                          const ShotSettings& settings, Draws& draws) noexcept {
+    const std::size_t sub_rays = cone_.size(), probes = probes_.size();
     std::size_t count = 0;
     for_each_lane(wanted, [&](std::size_t i) {
-        if (sub_rays > 1) across[i] = BeamCone::across(beams.direction[i], draws.of_echo(0).w2[i]);
-        first_[i] = count * sub_rays;
-        beam[count++] = i;
+        if (sub_rays > 1) across_[i] = BeamCone::across(beams.direction[i], draws.of_echo(0).w2[i]);
+        first_[i] = sub_rays * count++;
     });
+    on_plane_ = 0;
+    if (probes == 0) return trace(at, beams, first, wanted, 0, sub_rays, settings);
+    trace(at, beams, first, wanted, 0, probes, settings);
+    for_each_lane(wanted, [&](std::size_t i) {
+        if (probes_.lie_on_plane(std::span(met_).subspan(first_[i], probes), ratios_[i])) on_plane_ |= 1u << i;
+    });
+    trace(at, beams, first, wanted & ~on_plane_, probes, sub_rays, settings);
+}
+
+/// Traces the sub-rays `begin` to `end` of each of the beams `wanted`. They are nearly parallel, so they are traced
+/// in one batch, through the bodies that their beams may hit.
+void LidarReceiver::trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
+                          std::size_t begin, std::size_t end, ShotSettings settings) noexcept {
     const bool sunlight = settings.sunlight != 0;
-    for (std::size_t k = 0; k < count * sub_rays;) {
+    for (std::size_t s = begin; wanted != 0;) {
         RayBatch rays;
         DiffuseMultipath::SubRays of_beams;
         std::uint32_t shots = 0;
         settings.sunlight = 0;
-        const std::size_t begin = k;
-        while (rays.n < kLanes && k < count * sub_rays) {
-            const std::size_t i = beam[k / sub_rays], s = k % sub_rays, n = std::min(sub_rays - s, kLanes - rays.n);
+        Lanes<std::size_t> place;  // in `met_`
+        while (rays.n < kLanes && wanted != 0) {
+            const auto i = static_cast<std::size_t>(std::countr_zero(wanted));
+            const std::size_t n = std::min(end - s, kLanes - rays.n);
             // Sunlight of the first sub-ray alone, which is the nearest to the axis.
             if (sunlight && s == 0) settings.sunlight |= 1u << rays.n;
+            for (std::size_t j = 0; j < n; ++j) place[rays.n + j] = first_[i] + s + j;
             if (multipath_.is_on())
                 for (std::size_t j = 0; j < n; ++j)
-                    of_beams.put(rays.n + j, first + i, s + j, k + j, beams.direction[i]);
-            cone_.append(beams[i], across[i], s, n, rays);
+                    of_beams.put(rays.n + j, first + i, s + j, place[rays.n + j], beams.direction[i]);
+            cone_.append(beams[i], across_[i], s, n, rays);
             shots |= 1u << i;
-            k += n;
+            s += n;
+            if (s == end) wanted &= wanted - 1, s = begin;
         }
         settings.bodies = culling_.bodies_of(shots);
-        const auto met = std::span(met_).subspan(begin, rays.n);
+        std::array<LidarReturn, kLanes> met;
         HitBatch hits;
         shoot(tracer_, at, rays, settings, met, hits);
-        if (multipath_.is_on()) multipath_.trace(at, rays, of_beams, hits, met, settings);
+        for (std::size_t j = 0; j < rays.n; ++j) met_[place[j]] = met[j];
+        if (multipath_.is_on()) multipath_.trace(at, rays, of_beams, hits, std::span(met).first(rays.n), settings);
     }
+}
+
+/// The returns of a shot: of its probes, or of all its sub-rays.
+std::span<LidarReturn> LidarReceiver::met_by(std::size_t shot) noexcept {
+    return std::span(met_).subspan(first_[shot], is_set(on_plane_, shot) ? probes_.size() : cone_.size());
+}
+
+/// The echo of a shot whose probes lie on a plane.
+LidarReceiver::Echo LidarReceiver::echo_of_plane(std::span<const LidarReturn> probes,
+                                                 const BeamProbes::Ratios& ratios) noexcept {
+    const auto [nearest, farthest] = std::ranges::minmax(probes, {}, &LidarReturn::range_m);
+    Echo echo = echo_of(probes, nearest.range_m, farthest.range_m, static_cast<double>(probes.size()));
+    echo.light *= ratios.light;
+    echo.range_m *= ratios.range;
+    return echo;
 }
 
 /// Adds the light of one of `n` rays of a beam.

@@ -3,7 +3,8 @@
 /// A beam is a cone. One ray along its axis is wrong where it meets an edge, or a surface at more than 60 degrees
 /// of incidence, over which the footprint is spread by range * divergence * tan(incidence). Sub-rays sample the
 /// cone; their returns, sorted by range, are split into echoes wherever the next is farther than a pulse is long.
-/// An echo is at the mean range of its light, rho / range^2 for each sub-ray.
+/// An echo is at the mean range of its light, rho / range^2 for each sub-ray. Beams on a flat surface are sampled
+/// by a few of their sub-rays (renderer/lidar/beam_probes.h).
 ///
 /// The strength x of an echo is its light in units of the least that is detected in the dark, that of a diffuse
 /// surface of 10 % at LidarReceiverModel::range_at_10_percent_m. Sunlight raises the noise, and the threshold with
@@ -23,6 +24,7 @@
 #include "renderer/lidar/air_echo.h"
 #include "renderer/lidar/beam_cone.h"
 #include "renderer/lidar/beam_culling.h"
+#include "renderer/lidar/beam_probes.h"
 #include "renderer/lidar/diffuse_multipath.h"
 #include "renderer/lidar/lidar_shot.h"
 #include "renderer/scene/scene.h"
@@ -65,7 +67,12 @@ private:
 
     /// `first`: number of the first beam.
     void trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
-               ShotSettings settings, Draws& draws) noexcept;
+               const ShotSettings& settings, Draws& draws) noexcept;
+    void trace(const BodyPoses& at, const RayBatch& beams, std::uint64_t first, std::uint32_t wanted,
+               std::size_t begin, std::size_t end, ShotSettings settings) noexcept;
+    [[nodiscard]] std::span<LidarReturn> met_by(std::size_t shot) noexcept;
+    [[nodiscard]] static Echo echo_of_plane(std::span<const LidarReturn> probes,
+                                            const BeamProbes::Ratios& ratios) noexcept;
     [[nodiscard]] static Echo echo_of(std::span<const LidarReturn> met, double nearest_m, double farthest_m,
                                       double n) noexcept;
     static void add_light(const LidarReturn& r, double n, Echo& echo) noexcept;
@@ -98,8 +105,13 @@ private:
     const LidarMedium* medium_ = nullptr;
     AirEcho air_;
     BeamCulling culling_;
-    Lanes<std::size_t> first_{};    ///< sub-ray in `met_` of each shot that may meet a body
-    std::vector<LidarReturn> met_;  ///< of the sub-rays of one shot after the other
+    BeamProbes probes_;
+    // Of the shots that may meet a body.
+    Lanes<BeamCone::Across> across_{};
+    Lanes<std::size_t> first_{};          ///< sub-ray in `met_`
+    std::vector<LidarReturn> met_;        ///< of the sub-rays of one shot after the other
+    std::uint32_t on_plane_ = 0;          ///< those whose probes alone are traced
+    Lanes<BeamProbes::Ratios> ratios_{};  ///< of these
     DiffuseMultipath multipath_;
 };
 

@@ -102,6 +102,18 @@ std::vector<TrajectoryRow> there_and_back(std::vector<TrajectoryRow> rows) {
     return rows;
 }
 
+std::vector<TrajectoryRow> repeated(std::vector<TrajectoryRow> flight, std::int64_t until_ns) {
+    const std::size_t rows = flight.size();
+    const std::int64_t period_ns = rows > 0 ? flight.back().t_ns : 0;
+    for (std::int64_t start_ns = period_ns; period_ns > 0 && start_ns < until_ns; start_ns += period_ns)
+        for (std::size_t i = 0; i < rows; ++i) {
+            if (flight[i].t_ns == 0) continue;  // the end of the flight before
+            flight.push_back(flight[i]);
+            flight.back().t_ns += start_ns;
+        }
+    return flight;
+}
+
 Result<RecordedFlight> RecordedFlight::create(const Scene& scene, const std::string& path,
                                               const std::vector<TrajectoryRow>& rows) {
     auto ids = identifiers(scene, path, rows);

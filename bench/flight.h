@@ -15,6 +15,8 @@ namespace narpa {
 
 /// The rows, sorted by time from 0 on, then the same in reverse with reversed velocities.
 [[nodiscard]] std::vector<TrajectoryRow> there_and_back(std::vector<TrajectoryRow> rows);
+/// A flight that begins at 0 and ends where it began, flown again until this time.
+[[nodiscard]] std::vector<TrajectoryRow> repeated(std::vector<TrajectoryRow> flight, std::int64_t until_ns);
 
 /// A recorded bus in memory with the pose commands of a trajectory, each a tenth of a second before its time.
 class RecordedFlight {

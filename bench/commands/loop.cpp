@@ -70,8 +70,9 @@ Result<std::optional<RecordedFlight>> prepare_flight(LoopBenchOptions& o, const 
     if (o.trajectory.empty()) return std::optional<RecordedFlight>{};
     auto rows = read_trajectory(own_or_shipped(o.trajectory));
     if (!rows) return rows.error();
-    const std::vector<TrajectoryRow> flown = there_and_back(*std::move(rows));
+    std::vector<TrajectoryRow> flown = there_and_back(*std::move(rows));
     if (!o.duration_s) o.run.duration_s = std::max(1.0, static_cast<double>(flown.back().t_ns) * 1e-9);
+    flown = repeated(std::move(flown), static_cast<std::int64_t>(o.run.duration_s * 1e9));
     auto flight = RecordedFlight::create(scene, o.trajectory, flown);
     if (!flight) return flight.error();
     o.run.bus = flight->bus();
@@ -137,7 +138,8 @@ Command add_bench_loop(Parser bench_command) {
         .type_name("SECONDS")
         .range(0.1, 86400.0);
     c.option("--trajectory", o->trajectory,
-             "Fly these poses there and back, and list the frames by range (CSV, as for narpa fly)")
+             "Fly these poses there and back, again until the end, and list the frames by range (CSV, as for narpa "
+             "fly)")
         .type_name("FILE.csv");
     const Option load = c.option("--load", o->load, "Processors to keep busy, as 0,1 (default: the first)")
                             .type_name("LIST")

@@ -206,6 +206,19 @@ TEST(Flight, ReturnsTheWayItCame) {
     EXPECT_TRUE(there_and_back({}).empty());
 }
 
+TEST(Flight, IsFlownAgainUntilTheEnd) {
+    const std::vector<TrajectoryRow> once = there_and_back({row(0, 60, -2), row(1'000'000'000, 30, -1)});
+    ASSERT_EQ(once.size(), 3u);
+    const std::vector<TrajectoryRow> flown = repeated(once, 5'000'000'000);
+    ASSERT_EQ(flown.size(), 7u) << "three times, in six seconds";
+    for (std::size_t i = 0; i < flown.size(); ++i) {
+        EXPECT_EQ(flown[i].t_ns, static_cast<std::int64_t>(i) * 1'000'000'000);
+        EXPECT_EQ(flown[i].motion.T_world_body.t.x, i % 2 == 0 ? 60 : 30);
+    }
+    EXPECT_EQ(repeated(once, 1'000'000'000).size(), once.size());
+    EXPECT_TRUE(repeated({}, 5'000'000'000).empty());
+}
+
 TEST(Flight, ListsFramesByRange) {
     const Flown frames{{9, false, 0, 20, 1, 0.01}, {15.9, true, 3, 30, 0.5, 0.03}, {16, false, 4, 40, 0.1, -1}};
     const nlohmann::json ranges = by_range(frames);

@@ -122,20 +122,25 @@ Result<VideoEnds> open_video_ends(const std::string& spec, const VideoFormat& fo
         e.source = *std::move(source);
         return Ok{};
     };
-    const bool is_bulk = spec.starts_with("bulk:"), is_uvc = spec.starts_with("uvc:");
+    const bool is_bulk = spec.starts_with("bulk:"), is_uvc = spec.starts_with("uvc:"),
+               is_udp = spec.starts_with("udp:");
     struct stat info {};
-    if (!is_bulk && !is_uvc && !spec.ends_with(".y4m") && ::stat(spec.c_str(), &info) != 0 &&
+    if (!is_bulk && !is_uvc && !is_udp && !spec.ends_with(".y4m") && ::stat(spec.c_str(), &info) != 0 &&
         !spec.starts_with("/dev/") && ::mkfifo(spec.c_str(), 0600) != 0)
         return Error{.what = std::string("cannot make a FIFO: ") + std::strerror(errno), .file = spec};
     if (is_bulk) {
         if (auto good = open_source("bridge:0"); !good) return good.error();
         if (auto good = attach(e.source->description()); !good) return good.error();
     }
+    if (is_udp) {  // before the first datagram
+        const std::string address = spec.substr(0, spec.find(','));
+        if (auto good = open_source("udp:" + address.substr(address.rfind(':') + 1)); !good) return good.error();
+    }
     const std::function open_sink = [&] { return open_video_sink(spec, format, WhenFull::wait); };
     auto sink = is_bulk ? once_it_is_seen<Sink>(open_sink, stop) : open_sink();
     if (!sink) return sink.error();
     e.sink = *std::move(sink);
-    if (is_bulk || spec.ends_with(".y4m")) return e;
+    if (is_bulk || is_udp || spec.ends_with(".y4m")) return e;
     if (!is_uvc) {
         if (auto good = open_source(spec); !good) return good.error();
         return e;

@@ -88,7 +88,9 @@ Outcome bench_latency(LatencyBenchOptions o) {
     if (is_default) {
         if (folder.path.empty()) return Error{.what = "cannot make a temporary folder", .kind = ErrorKind::failed};
         o.buses = {"slcan:0", "udp:239.74.163.2"};
-        o.sinks = {folder.path + "/fifo", folder.path + "/frames.y4m"};
+        const auto port = rehearsal::free_lidar_port();
+        if (!port) return port.error();
+        o.sinks = {folder.path + "/fifo", folder.path + "/frames.y4m", fmt::format("udp:127.0.0.1:{}", *port)};
     }
     auto rows = measure_ways(o, is_default);
     if (!rows) return rows.error();
@@ -115,8 +117,10 @@ Command add_bench_latency(Parser bench_command) {
         .repeatable();
     c.option(
          "--video", o->sinks,
-         "SINK as of `narpa run`, read by the bench itself: /dev/videoN, a FIFO, FILE.y4m; uvc:PORT and bulk: are "
-         "attached to this machine, with a bridge in software (vhci-hcd, root); may be given many times")
+         "SINK as of `narpa run`, read by the bench itself: /dev/videoN, a FIFO, FILE.y4m, udp:127.0.0.1:PORT; "
+         "uvc:PORT "
+         "and bulk: are attached to this machine, with a bridge in software (vhci-hcd, root); may be given many "
+         "times")
         .type_name("SINK")
         .repeatable();
     c.option("--size", o->size, "Size of the frames").type_name("WIDTHxHEIGHT").shows_default();
@@ -126,7 +130,7 @@ Command add_bench_latency(Parser bench_command) {
         .type_name("SECONDS")
         .range(0.0, 60.0)
         .shows_default();
-    c.footer("Without --can and --video: slcan, UDP multicast, a FIFO, a file, and LiDAR packets over UDP.");
+    c.footer("Without --can and --video: slcan, UDP multicast, a FIFO, a file, frames and LiDAR packets over UDP.");
     c.examples({"narpa bench latency",
                 "narpa bench latency --can vcan0 --can usb:=vcan0 --video /dev/video10 --video bulk:"});
     return [o] { return bench_latency(*o); };

@@ -12,7 +12,7 @@
 #include <cstring>
 
 #include "drivers/can/buses.h"
-#include "drivers/can/datagram.h"
+#include "drivers/datagram.h"
 #include "drivers/descriptor.h"
 
 namespace narpa {

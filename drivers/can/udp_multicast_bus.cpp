@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "drivers/can/buses.h"
-#include "drivers/can/datagram.h"
+#include "drivers/datagram.h"
 #include "drivers/descriptor.h"
 #include "protocols/can/udp_multicast.h"
 

@@ -11,7 +11,7 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/can/datagram.h"
+#include "drivers/datagram.h"
 #include "drivers/descriptor.h"
 #include "drivers/http/http_server.h"
 #include "drivers/lidar/backends.h"

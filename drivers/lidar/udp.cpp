@@ -1,4 +1,3 @@
-#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -12,12 +11,13 @@
 #include <utility>
 
 #include "base/text/read_number.h"
-#include "drivers/can/datagram.h"
+#include "drivers/datagram.h"
 #include "drivers/descriptor.h"
 #include "drivers/lidar/backends.h"
 #include "drivers/lidar/packet_source.h"
 #include "drivers/lidar/receiver_watch.h"
-#include "drivers/lidar/udp_route.h"
+#include "drivers/udp_listener.h"
+#include "drivers/udp_route.h"
 
 namespace narpa {
 namespace {
@@ -128,45 +128,11 @@ PacketSinkResult open_udp_sink(const std::string& text, const PacketSinkOptions&
 
 Result<std::unique_ptr<PacketSource>> open_packet_source(std::string_view spec) {
     constexpr std::string_view scheme = "udp:";
-    const std::string name = "packet source \"" + std::string(spec) + "\"";
     const std::string_view rest = spec.starts_with(scheme) ? spec.substr(scheme.size()) : std::string_view{};
-    auto address = UdpAddress::parse(rest);
-    if (!address) return address.error();
-    const std::string& port = address->port;
-    if (rest.find(':') == rest.npos) address->host = "0.0.0.0";
-    if (address->host.empty() || address->ttl >= 0 || !udp_port(port))
-        return Error{name + ": expected udp:PORT or udp:ADDRESS:PORT with a port from 1 to 65535, as in udp:2368"};
-
-    // A link-local IPv6 address is complete only with its interface.
-    const bool ipv6 = address->host.find(':') != std::string::npos;
-    const std::string node = address->host + (ipv6 && !address->interface.empty() ? "%" + address->interface : "");
-    addrinfo hints{}, *found = nullptr;
-    hints.ai_socktype = SOCK_DGRAM;
-    hints.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
-    if (const int failure = ::getaddrinfo(node.c_str(), port.c_str(), &hints, &found); failure != 0)
-        return Error{name + ": \"" + node + "\" is not an address: " + ::gai_strerror(failure)};
-    UdpDestination at;
-    std::memcpy(&at.address, found->ai_addr, found->ai_addrlen);
-    at.size = found->ai_addrlen;
-    ::freeaddrinfo(found);
-    if (!ipv6 && !address->interface.empty() && !at.is_multicast())
-        return Error{name + ": an interface is named to join a multicast group, and " + address->host + " is none"};
-    Descriptor fd(::socket(at.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-    const int on = 1;  // a group has any number of receivers
-    if (fd && at.is_multicast()) ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    const bool bound = fd && ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&at.address), at.size) == 0;
-    const int reason = errno;
-    if (!bound) {
-        Error error{name + ": cannot listen: " + std::strerror(reason), {}, 0, 0, ErrorKind::missing};
-        if (reason == EADDRINUSE)
-            error.remedy = "another port, or see who has it: ss -lunp 'sport = :" + port + "'";
-        if (reason == EADDRNOTAVAIL) error.remedy = "ip -br address   (the addresses of this machine)";
-        return error;
-    }
-    if (auto joined = join_group(fd.get(), at, *address, name); !joined) return joined.error();
-    prepare_for_bursts(fd.get());
-    return std::unique_ptr<PacketSource>(
-        std::make_unique<UdpSource>(std::move(fd), "UDP at " + address->host + ", port " + port));
+    auto listener = listen_udp(rest, "packet source \"" + std::string(spec) + "\"");
+    if (!listener) return listener.error();
+    return std::unique_ptr<PacketSource>(std::make_unique<UdpSource>(
+        std::move(listener->fd), "UDP at " + listener->host + ", port " + listener->port));
 }
 
 }  // namespace narpa

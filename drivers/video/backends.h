@@ -49,6 +49,8 @@ VideoSinkResult open_uvc_sink(const std::string& address, const VideoSinkOptions
 VideoSinkResult open_bulk_sink(const std::string& text, const VideoSinkOptions& o);
 /// `address`: [HOST:]PORT to listen at for clients that read Y4M.
 VideoSinkResult open_tcp_sink(const std::string& address, const VideoSinkOptions& o);
+/// `text`: HOST[%INTERFACE]:PORT[,mtu=N][,mbit_s=N][,ttl=N].
+VideoSinkResult open_udp_video_sink(const std::string& text, const VideoSinkOptions& o);
 /// The file is made or emptied.
 VideoSinkResult open_y4m_file(const std::string& path, const VideoSinkOptions& o);
 VideoSinkResult open_y4m_fifo(const std::string& path, const VideoSinkOptions& o);
@@ -57,6 +59,8 @@ VideoSinkResult open_y4m_fifo(const std::string& path, const VideoSinkOptions& o
 VideoSourceResult open_v4l2_source(const std::string& path, const VideoFormat& format);
 /// `address`: [HOST:]PORT to listen at for the host that attaches the bridge.
 VideoSourceResult open_bridge_source(const std::string& address, const VideoFormat& format);
+/// `text`: udp_listener.h.
+VideoSourceResult open_udp_video_source(const std::string& text, const VideoFormat& format);
 VideoSourceResult open_y4m_source(const std::string& path, const VideoFormat& format);
 
 }  // namespace narpa

@@ -1,5 +1,5 @@
 /// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a USB camera or frame bridge, Y4M to a file,
-/// a FIFO or TCP clients, or none.
+/// a FIFO or TCP clients, UDP datagrams, or none.
 ///
 /// A sink owns a thread and a ring of preallocated frames, so that handing over a frame is one copy: no disk,
 /// reader or device can block the loop.
@@ -21,7 +21,7 @@ namespace narpa {
 struct VideoCounters {
     std::uint64_t written = 0;    ///< whole frames that reached the device, file or reader
     std::uint64_t ring_full = 0;  ///< dropped: the sink could not keep up
-    std::uint64_t no_reader = 0;  ///< dropped: a FIFO or TCP port without a reader
+    std::uint64_t no_reader = 0;  ///< dropped: a FIFO or TCP port without a reader, a UDP port that nobody has
     std::uint64_t failed = 0;  ///< dropped: the write failed (device gone, disk full), or a TCP client was too slow
     std::uint64_t reconnects = 0;  ///< times that a reader or a device was connected again
 };

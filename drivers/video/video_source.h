@@ -1,4 +1,5 @@
-/// drivers/video/video_source.h - source of frames: a V4L2 capture device, a USB frame bridge, a Y4M FIFO or file.
+/// drivers/video/video_source.h - source of frames: a V4L2 capture device, a USB frame bridge, UDP datagrams, a Y4M
+/// FIFO or file.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +14,10 @@
 namespace narpa {
 
 struct VideoSourceCounters {
-    std::uint64_t received = 0;  ///< whole frames handed out
-    std::uint64_t truncated =
-        0;                   ///< dropped: the writer closed within a frame, or the device returned too few bytes
-    std::uint64_t lost = 0;  ///< gaps in the device's sequence numbers: the frames were not read in time
+    std::uint64_t received = 0;   ///< whole frames handed out
+    std::uint64_t truncated = 0;  ///< dropped: the writer closed within a frame, the device returned too few bytes,
+                                  ///< or datagrams were lost
+    std::uint64_t lost = 0;       ///< gaps in the device's sequence numbers: the frames were not read in time
 };
 
 /// Whole frames in the order of arrival, none twice. A writer may open later, close, and open again: a FIFO's next

@@ -10,6 +10,7 @@ Pure Python, for programs that meet narpa on the wire or in files:
     narpa.can       open a bus, send and receive pose commands and all other messages by their names in narpa.dbc
     narpa.dbc       DBC files: messages, signals, encoding
     narpa.y4m       video streams, as `narpa run --video CAMERA=FILE.y4m` writes them
+    narpa.datagrams frames in UDP datagrams, as `narpa run --video CAMERA=udp:HOST:PORT` sends them
     narpa.vlp16     VLP-16 data packets, as `narpa run --lidar LIDAR=udp:HOST:PORT` sends them
     narpa.points    packets of LiDARs that are described by a file
     narpa.pcap      UDP datagrams of a capture

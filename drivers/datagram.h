@@ -1,4 +1,4 @@
-/// drivers/can/datagram.h - one datagram: sent, or read with the time of its arrival and the kernel's
+/// drivers/datagram.h - one datagram: sent, or read with the time of its arrival and the kernel's
 /// count of lost ones.
 #pragma once
 

@@ -1,7 +1,8 @@
-/// drivers/lidar/udp_route.h - where UDP datagrams go and how they leave this machine: address, interface, time to
+/// drivers/udp_route.h - where UDP datagrams go and how they leave this machine: address, interface, time to
 /// live.
 ///
 /// Text: HOST[%INTERFACE]:PORT[,ttl=N], an IPv6 host in brackets (RFC 4007 writes the interface in the same way).
+/// A sink may take further options of this form.
 /// Broadcast and multicast addresses need an entry in the routing table, which often has none, or a named
 /// interface.
 #pragma once
@@ -10,18 +11,26 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/result.h"
 
 namespace narpa {
+
+/// An option behind an address: NAME=N.
+struct UdpOption {
+    std::string_view name;
+    int least, most;
+    int* value;  ///< out; unchanged where the option is not given
+};
 
 /// The parts of an address text; they may be empty.
 struct UdpAddress {
     std::string host, interface, port;
     int ttl = -1;  ///< 0 to 255; -1: the system's, 1 for multicast
 
-    /// Errors concern the options; host and port are not checked.
-    static Result<UdpAddress> parse(std::string_view text);
+    /// Errors concern the options, `ttl` and these; host and port are not checked.
+    static Result<UdpAddress> parse(std::string_view text, std::vector<UdpOption> options = {});
 };
 
 /// An address with its family; the port is 0.

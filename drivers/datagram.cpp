@@ -1,4 +1,4 @@
-#include "drivers/can/datagram.h"
+#include "drivers/datagram.h"
 
 #include <cerrno>
 #include <cstring>

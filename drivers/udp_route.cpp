@@ -1,14 +1,16 @@
-#include "drivers/lidar/udp_route.h"
+#include "drivers/udp_route.h"
 
 #include <arpa/inet.h>
 #include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <span>
 
 #include "base/text/read_number.h"
 #include "drivers/descriptor.h"
@@ -71,22 +73,42 @@ bool has_route(const UdpDestination& to) {
            errno != ENETUNREACH;
 }
 
+/// Reads "NAME=N,NAME=N".
+Status read_options(std::string_view text, std::span<const UdpOption> options) {
+    for (bool more = true; more;) {
+        const std::string_view option = text.substr(0, text.find(','));
+        more = option.size() < text.size();
+        text = text.substr(std::min(option.size() + 1, text.size()));
+        const std::size_t equals = std::min(option.find('='), option.size());
+        const auto known = std::ranges::find(options, option.substr(0, equals), &UdpOption::name);
+        int value = 0;
+        if (known != options.end() && equals < option.size() && read_number(option.substr(equals + 1), value) &&
+            value >= known->least && value <= known->most) {
+            *known->value = value;
+            continue;
+        }
+        std::string expected;
+        for (const UdpOption& o : options)
+            expected.append(expected.empty() ? "" : " or ")
+                .append("," + std::string(o.name) + "=N, from " + std::to_string(o.least) + " to " +
+                        std::to_string(o.most));
+        return Error{"expected nothing after the port but " + expected};
+    }
+    return Ok{};
+}
+
 bool is_limited_broadcast(const UdpDestination& to) {
     return to.address.ss_family == AF_INET && as_ipv4(to.address).sin_addr.s_addr == INADDR_BROADCAST;
 }
 
 }  // namespace
 
-Result<UdpAddress> UdpAddress::parse(std::string_view text) {
+Result<UdpAddress> UdpAddress::parse(std::string_view text, std::vector<UdpOption> options) {
     UdpAddress out;
+    options.insert(options.begin(), {"ttl", 0, 255, &out.ttl});
     if (const std::size_t comma = text.find(','); comma != text.npos) {
-        constexpr std::string_view key = "ttl=";
-        const std::string_view option = text.substr(comma + 1);
-        std::uint8_t ttl = 0;
-        if (!option.starts_with(key) || !read_number(option.substr(key.size()), ttl))
-            return Error{"udp:" + std::string(text) +
-                         ": expected nothing after the port but ,ttl=N, from 0 to 255"};
-        out.ttl = ttl;
+        if (auto read = read_options(text.substr(comma + 1), options); !read)
+            return Error{"udp:" + std::string(text) + ": " + read.error().what};
         text = text.substr(0, comma);
     }
     const std::size_t colon = text.rfind(':');

@@ -1,0 +1,163 @@
+// Frames in datagrams: from the sink udp: to the source udp:, on the loopback.
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include "base/time.h"
+#include "drivers/descriptor.h"
+#include "drivers/video/video_sink.h"
+#include "drivers/video/video_source.h"
+#include "protocols/video/frame_datagram.h"
+#include "tests/drivers/video_support.h"
+
+namespace narpa {
+namespace {
+
+using test::Bytes, test::noise_frame;
+
+constexpr VideoFormat kSmallFrames{64, 48, PixelFormat::y16, 100'000'000};
+constexpr std::int64_t kSoon_ns = 60'000'000'000;
+
+/// A socket at a port that nobody else has.
+class OwnPort {
+public:
+    OwnPort() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+        sockaddr_in at{};
+        at.sin_family = AF_INET;
+        at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        EXPECT_EQ(::bind(fd_.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
+        socklen_t size = sizeof at;
+        ::getsockname(fd_.get(), reinterpret_cast<sockaddr*>(&at), &size);
+        number_ = ntohs(at.sin_port);
+    }
+    [[nodiscard]] std::string text() const { return std::to_string(number_); }
+    [[nodiscard]] int fd() const { return fd_.get(); }
+    /// Leaves it to another socket.
+    std::string release() {
+        fd_.reset();
+        return text();
+    }
+
+private:
+    Descriptor fd_;
+    std::uint16_t number_ = 0;
+};
+
+std::unique_ptr<VideoSink> sink_to(const std::string& port_and_options, const VideoFormat& format) {
+    auto sink = open_video_sink("udp:127.0.0.1:" + port_and_options, format, WhenFull::wait);
+    EXPECT_TRUE(sink) << sink.error().text();
+    return sink ? std::move(*sink) : nullptr;
+}
+std::unique_ptr<VideoSource> source_at(const std::string& port, const VideoFormat& format) {
+    auto source = open_video_source("udp:127.0.0.1:" + port, format);
+    EXPECT_TRUE(source) << source.error().text();
+    return source ? std::move(*source) : nullptr;
+}
+
+TEST(UdpVideo, FramesArriveAsTheyWereSent) {
+    for (const PixelFormat pixel : {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24, PixelFormat::bggr16})
+        for (const char* options : {"", ",mtu=128", ",mtu=9000,mbit_s=10000", ",mtu=65535,ttl=3"}) {
+            const VideoFormat format{64, 48, pixel, 100'000'000};
+            const std::string port = OwnPort().release();
+            const auto source = source_at(port, format);
+            const auto sink = sink_to(port + options, format);
+            ASSERT_TRUE(source && sink);
+            Bytes came(frame_bytes(format));
+            for (std::uint32_t k = 0; k < 3; ++k) {
+                const Bytes frame = noise_frame(format, k);
+                ASSERT_TRUE(sink->send(frame, {.t_ns = k * 100, .number = k}));
+                ASSERT_TRUE(source->receive(came, kSoon_ns)) << name(pixel) << options;
+                EXPECT_TRUE(came == frame) << name(pixel) << options;
+            }
+            sink->flush();
+            EXPECT_EQ(sink->counters().written, 3u);
+            EXPECT_EQ(source->counters().received, 3u);
+            EXPECT_EQ(source->counters().truncated + source->counters().lost, 0u);
+        }
+}
+
+TEST(UdpVideo, DatagramsFitTheMtu) {
+    const OwnPort port;
+    const auto sink = sink_to(port.text() + ",mtu=1000", kSmallFrames);
+    ASSERT_TRUE(sink);
+    ASSERT_TRUE(sink->send(noise_frame(kSmallFrames, 1), {.t_ns = -5, .number = 17}));
+    std::uint32_t count = 1;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        Bytes datagram(65536);
+        const ssize_t n = ::recv(port.fd(), datagram.data(), datagram.size(), 0);
+        ASSERT_GT(n, 0);
+        EXPECT_LE(n, 1000 - 28);
+        EXPECT_GT(n, 1000 - 28 - 128) << "as many rows as fit";
+        const auto header = decode_frame_datagram(std::span(datagram).first(static_cast<std::size_t>(n)));
+        ASSERT_TRUE(header);
+        EXPECT_EQ(header->index, i);
+        EXPECT_EQ(header->frame, 17u);
+        EXPECT_EQ(header->t_ns, -5);
+        count = header->count;
+    }
+    EXPECT_EQ(count, 7u) << "48 rows of 128 bytes, seven in a datagram";
+}
+
+/// The rate is an upper bound: nothing can make a slow machine fast.
+TEST(UdpVideo, LeavesNoFasterThanItsRate) {
+    const VideoFormat format{640, 480, PixelFormat::grey, 1'000'000'000};
+    const std::string port = OwnPort().release();
+    const auto source = source_at(port, format);
+    const auto sink = sink_to(port + ",mbit_s=20", format);
+    ASSERT_TRUE(source && sink);
+    Bytes came(frame_bytes(format));
+    const std::int64_t begin_ns = monotonic_ns();
+    ASSERT_TRUE(sink->send(noise_frame(format, 0), {}));
+    ASSERT_TRUE(source->receive(came, kSoon_ns));
+    EXPECT_GT(monotonic_ns() - begin_ns, 120'000'000) << "2.5 Mbit at 20 Mbit/s";
+}
+
+TEST(UdpVideo, CountsFramesThatNobodyReceives) {
+    const auto sink = sink_to(OwnPort().release(), kSmallFrames);
+    ASSERT_TRUE(sink);
+    // The refusal of the first frame is known when the second datagram is sent.
+    for (std::uint32_t k = 0; k < 4; ++k) {
+        EXPECT_TRUE(sink->send(noise_frame(kSmallFrames, k), {.number = k}));
+        sink->flush();
+    }
+    EXPECT_GE(sink->counters().no_reader, 3u);
+    EXPECT_EQ(sink->counters().failed, 0u);
+}
+
+TEST(UdpVideo, SourceNamesAnotherFormat) {
+    const std::string port = OwnPort().release();
+    const auto source = source_at(port, kSmallFrames);
+    const VideoFormat other{32, 16, PixelFormat::grey, 100'000'000};
+    const auto sink = sink_to(port, other);
+    ASSERT_TRUE(source && sink);
+    ASSERT_TRUE(sink->send(noise_frame(other, 0), {}));
+    Bytes came(frame_bytes(kSmallFrames));
+    EXPECT_FALSE(source->receive(came, kSoon_ns));
+    ASSERT_FALSE(source->status());
+    EXPECT_NE(source->status().error().what.find("32 x 16 GREY"), std::string::npos);
+}
+
+TEST(UdpVideo, BadTextsGetErrorsThatSayWhatIsExpected) {
+    for (const auto& [text, expected] : std::vector<std::pair<std::string, std::string>>{
+             {"udp:", "expected udp:HOST:PORT"},
+             {"udp:5004", "expected udp:HOST:PORT"},
+             {"udp:127.0.0.1:0", "expected udp:HOST:PORT"},
+             {"udp:127.0.0.1:70000", "expected udp:HOST:PORT"},
+             {"udp:127.0.0.1:5004,", "expected nothing after the port but ,ttl=N, from 0 to 255 or ,mtu=N"},
+             {"udp:127.0.0.1:5004,mtu=127", ",mtu=N, from 128 to 65535"},
+             {"udp:127.0.0.1:5004,mtu", ",mtu=N, from 128 to 65535"},
+             {"udp:127.0.0.1:5004,mtu=1500,mbit_s=0", ",mbit_s=N, from 1 to 100000"},
+             {"udp:127.0.0.1:5004,mbit_s=1", "expected ,mbit_s=54 or more"},
+             {"udp:no.such.host.invalid:5004", "unknown host"}}) {
+        const VideoFormat format{1600, 400, PixelFormat::grey, 100'000'000};
+        const auto sink = open_video_sink(text, format, WhenFull::drop);
+        ASSERT_FALSE(sink) << text;
+        EXPECT_NE(sink.error().text().find(expected), std::string::npos) << sink.error().text();
+    }
+    EXPECT_FALSE(open_video_source("udp:0", kSmallFrames));
+    EXPECT_FALSE(open_video_source("udp:127.0.0.1", kSmallFrames));
+}
+
+}  // namespace
+}  // namespace narpa

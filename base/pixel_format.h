@@ -1,4 +1,5 @@
-/// base/pixel_format.h - the pixel formats that narpa puts out, by their V4L2 names.
+/// base/pixel_format.h - the pixel formats that narpa puts out, by their V4L2 names: samples, and what links make
+/// of them.
 #pragma once
 
 #include <algorithm>
@@ -29,10 +30,25 @@ enum class PixelFormat : std::uint8_t {
     bggr16,
 };
 
+/// How a link lays out samples of 16 bits; the samples themselves stay left-justified everywhere else.
+struct LinkLayout {
+    enum class Kind : std::uint8_t {
+        samples,  ///< as they are; the only one of samples that do not have 16 bits
+        right,    ///< right-justified in 16 bits, little-endian
+        mipi,     ///< MIPI CSI-2 RAW10 and RAW12: the high bytes of 4 or 2 pixels, then a byte of their low bits
+    };
+    Kind kind = Kind::samples;
+    std::uint8_t bits = 16;              ///< of a pixel: the ADC's
+    std::uint16_t first_bytes_kept = 0;  ///< of the last row: an embedded line, which is not laid out
+    [[nodiscard]] bool is_samples() const { return kind == Kind::samples; }
+    friend bool operator==(const LinkLayout&, const LinkLayout&) = default;
+};
+
 struct VideoFormat {
     int width = 0, height = 0;
     PixelFormat pixel = PixelFormat::grey;
     std::int64_t period_ns = 100'000'000;  ///< 1 / frame rate
+    LinkLayout link{};
 };
 
 /// What is known of a format. A text is empty where the protocol has no code for it.
@@ -79,6 +95,70 @@ inline constexpr auto kPixelFormatNames = [] {
     return row_of(f).name;
 }
 
+/// A format of a link: samples of a format of 16 bits, laid out. Names and codes are V4L2's.
+struct LinkFormatRow {
+    std::string_view name;
+    PixelFormat samples;
+    LinkLayout layout;
+    std::string_view v4l2;
+    std::string_view y4m{};
+};
+inline constexpr auto kLinkFormats = [] {
+    using Kind = LinkLayout::Kind;
+    constexpr LinkLayout r10{Kind::right, 10}, r12{Kind::right, 12}, r14{Kind::right, 14}, p10{Kind::mipi, 10},
+        p12{Kind::mipi, 12};
+    constexpr PixelFormat y = PixelFormat::y16, rg = PixelFormat::rggb16, gr = PixelFormat::grbg16,
+                          gb = PixelFormat::gbrg16, bg = PixelFormat::bggr16;
+    return std::to_array<LinkFormatRow>({
+        {"Y10", y, r10, "Y10 ", "mono10"}, {"Y12", y, r12, "Y12 ", "mono12"}, {"Y14", y, r14, "Y14 "},
+        {"Y10P", y, p10, "Y10P"},          {"Y12P", y, p12, "Y12P"},          {"RGGB10", rg, r10, "RG10"},
+        {"RGGB12", rg, r12, "RG12"},       {"RGGB14", rg, r14, "RG14"},       {"RGGB10P", rg, p10, "pRAA"},
+        {"RGGB12P", rg, p12, "pRCC"},      {"GRBG10", gr, r10, "BA10"},       {"GRBG12", gr, r12, "BA12"},
+        {"GRBG14", gr, r14, "GR14"},       {"GRBG10P", gr, p10, "pgAA"},      {"GRBG12P", gr, p12, "pgCC"},
+        {"GBRG10", gb, r10, "GB10"},       {"GBRG12", gb, r12, "GB12"},       {"GBRG14", gb, r14, "GB14"},
+        {"GBRG10P", gb, p10, "pGAA"},      {"GBRG12P", gb, p12, "pGCC"},      {"BGGR10", bg, r10, "BG10"},
+        {"BGGR12", bg, r12, "BG12"},       {"BGGR14", bg, r14, "BG14"},       {"BGGR10P", bg, p10, "pBAA"},
+        {"BGGR12P", bg, p12, "pBCC"},
+    });
+}();
+/// All names that a camera's `format` may have: those of samples, then those of links.
+inline constexpr auto kCameraFormatNames = [] {
+    std::array<std::string_view, kPixelFormats.size() + kLinkFormats.size()> names;
+    auto end = std::ranges::transform(kPixelFormats, names.begin(), &PixelFormatRow::name).out;
+    std::ranges::transform(kLinkFormats, end, &LinkFormatRow::name);
+    return names;
+}();
+/// The row of a format that is laid out for its link; null: the link has the samples.
+[[nodiscard]] constexpr const LinkFormatRow* link_format_of(PixelFormat samples, const LinkLayout& layout) {
+    for (const LinkFormatRow& row : kLinkFormats)
+        if (row.samples == samples && row.layout.kind == layout.kind && row.layout.bits == layout.bits) return &row;
+    return nullptr;
+}
+/// Name, V4L2's code and Y4M's colour space of what a link carries.
+[[nodiscard]] constexpr std::string_view link_name(PixelFormat samples, const LinkLayout& layout) {
+    const LinkFormatRow* row = link_format_of(samples, layout);
+    return row != nullptr ? row->name : name(samples);
+}
+[[nodiscard]] constexpr std::string_view link_code(PixelFormat samples, const LinkLayout& layout) {
+    const LinkFormatRow* row = link_format_of(samples, layout);
+    return row != nullptr ? row->v4l2 : row_of(samples).v4l2;
+}
+[[nodiscard]] constexpr std::string_view link_y4m(PixelFormat samples, const LinkLayout& layout) {
+    const LinkFormatRow* row = link_format_of(samples, layout);
+    return row != nullptr ? row->y4m : row_of(samples).y4m;
+}
+struct LinkPixels {
+    PixelFormat samples = PixelFormat::grey;
+    LinkLayout layout{};
+};
+/// What V4L2's code stands for.
+[[nodiscard]] constexpr std::optional<LinkPixels> link_from_code(std::string_view code) {
+    for (const LinkFormatRow& row : kLinkFormats)
+        if (row.v4l2 == code) return LinkPixels{row.samples, row.layout};
+    if (const auto samples = pixel_format_from(code, &PixelFormatRow::v4l2)) return LinkPixels{*samples, {}};
+    return std::nullopt;
+}
+
 [[nodiscard]] constexpr bool is_bayer(PixelFormat f) {
     return !row_of(f).mosaic.empty();
 }
@@ -93,8 +173,20 @@ inline constexpr auto kPixelFormatNames = [] {
 [[nodiscard]] constexpr std::size_t bytes_per_pixel(PixelFormat f) {
     return row_of(f).bytes;
 }
+/// Of samples.
 [[nodiscard]] constexpr std::size_t frame_bytes(const VideoFormat& f) {
     return static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) * bytes_per_pixel(f.pixel);
+}
+/// Of a row on the link, and of a frame. Packed pixels come in groups of whole bytes (unfit_width).
+[[nodiscard]] constexpr std::size_t link_row_bytes(std::size_t width, PixelFormat samples,
+                                                   const LinkLayout& layout) {
+    return layout.kind == LinkLayout::Kind::mipi ? width * layout.bits / 8 : width * bytes_per_pixel(samples);
+}
+[[nodiscard]] constexpr std::size_t link_row_bytes(const VideoFormat& f) {
+    return link_row_bytes(static_cast<std::size_t>(f.width), f.pixel, f.link);
+}
+[[nodiscard]] constexpr std::size_t link_bytes(const VideoFormat& f) {
+    return link_row_bytes(f) * static_cast<std::size_t>(f.height);
 }
 
 /// The band of a mosaic's pixel: 0 red, 1 green, 2 blue.
@@ -111,6 +203,14 @@ inline constexpr auto kPixelFormatNames = [] {
     if ((f == PixelFormat::yuyv || is_bayer(f)) && width % 2 != 0) return text("width", width);
     if (is_bayer(f) && height % 2 != 0) return text("height", height);
     return {};
+}
+/// Why a row of this width cannot be laid out, or an empty text.
+[[nodiscard]] inline std::string unfit_width(PixelFormat f, const LinkLayout& layout, int width) {
+    const int group = layout.kind != LinkLayout::Kind::mipi ? 1 : layout.bits == 10 ? 4 : 2;
+    if (width % group == 0) return {};
+    return std::string(link_name(f, layout)) + " holds " + std::to_string(group) +
+           " pixels together, expected a width that is a multiple of " + std::to_string(group) + ", not " +
+           std::to_string(width);
 }
 
 }  // namespace narpa

@@ -15,7 +15,7 @@ namespace {
 
 /// An Error if the camera's rows are too narrow for its embedded line.
 Status check_camera(const Camera& c, const std::string& file) {
-    const std::size_t row = static_cast<std::size_t>(c.width) * bytes_per_pixel(c.format);
+    const std::size_t row = link_row_bytes(c.video_format());
     if (c.embedded_line && row < kEmbeddedLineBytes)
         return Error{fmt::format("camera \"{}\": rows of {} bytes, expected at least {} for embedded_line", c.name,
                                  row, kEmbeddedLineBytes),

@@ -162,7 +162,7 @@ Status test_devices(const std::vector<std::string>& devices, const DeviceOptions
         const auto index = sensor_named(scene.cameras, name, "camera", scene.file);
         if (!index) return index.error();
         const Camera& c = scene.cameras[*index];
-        if (auto good = add(test_video(spec, {c.width, c.height, c.format, c.period_ns})); !good) return good;
+        if (auto good = add(test_video(spec, c.video_format())); !good) return good;
     }
     for (const auto& [name, spec] : *lidar) {
         const auto index = sensor_named(scene.lidars, name, "LiDAR", scene.file);

@@ -27,7 +27,7 @@ UsbDescriptors bridge_descriptors(std::string serial) {
 
 BridgeDevice::BridgeDevice(const VideoFormat& format, std::string serial)
     : format_(format), descriptors_(bridge_descriptors(std::move(serial))) {
-    for (Slot& slot : slots_) slot.bytes.resize(kBulkHeaderBytes + frame_bytes(format));
+    for (Slot& slot : slots_) slot.bytes.resize(kBulkHeaderBytes + link_bytes(format));
 }
 
 // --- The server's thread ---------------------------------------------
@@ -66,7 +66,8 @@ void BridgeDevice::conclude() noexcept {
     Slot& slot = slots_[(first_ + ready_) % kFrames];
     const auto bytes = std::span<const std::uint8_t>(slot.bytes);
     const auto header = decode_bulk_header(bytes.first(kBulkHeaderBytes));
-    const bool is_good = filled_ == bytes.size() && header && header->pixel == format_.pixel &&
+    const bool is_good = filled_ == bytes.size() && header &&
+                         link_code(header->pixel, header->link) == link_code(format_.pixel, format_.link) &&
                          std::cmp_equal(header->width, format_.width) &&
                          std::cmp_equal(header->height, format_.height) &&
                          header->pixels_crc32 == crc32(bytes.subspan(kBulkHeaderBytes));

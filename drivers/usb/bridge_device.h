@@ -34,7 +34,7 @@ public:
     [[nodiscard]] int give(int endpoint, std::span<std::uint8_t> room) noexcept override;
 
     // --- From the thread that reads the frames ---
-    /// The next whole frame, in order; waits at most `timeout_ns`. `pixels`: frame_bytes of the format. `wake`:
+    /// The next whole frame, in order; waits at most `timeout_ns`. `pixels`: link_bytes of the format. `wake`:
     /// UsbIpServer::wake. False: none came.
     bool receive(std::span<std::uint8_t> pixels, BulkFrameHeader& header, std::int64_t timeout_ns,
                  const std::function<void()>& wake);

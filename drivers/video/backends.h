@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "drivers/video/video_sink.h"
 #include "drivers/video/video_source.h"
@@ -17,6 +18,7 @@ namespace narpa {
 class VideoWriter : public QueueWriter {
 public:
     /// Writes a frame, or counts why not; may block as QueueWriter::write may.
+    /// `frame`: as its link carries it, link_bytes.
     virtual void write_frame(std::span<const std::uint8_t> frame, const FrameStamp& stamp,
                              const WriteQueue& queue) noexcept = 0;
     /// An item: the stamp, then the frame.
@@ -27,6 +29,12 @@ public:
 
     std::atomic<std::uint64_t> written{0}, no_reader{0}, failed{0}, reconnects{0};
     std::atomic<int> file_error{0};  ///< errno of a file that did not take a frame
+
+private:
+    friend std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter>, const VideoFormat&, WhenFull,
+                                                  std::string);
+    VideoFormat format_{};
+    std::vector<std::uint8_t> laid_out_{};  ///< empty where the link has the samples
 };
 /// A sink that queues frames for the writer. It counts frames of another size as failed.
 std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, const VideoFormat& format,

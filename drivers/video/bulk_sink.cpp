@@ -106,7 +106,7 @@ public:
         if (!link_ && !reopen()) return void(++failed);
         const auto header =
             encode_bulk_header({stamp.t_ns, stamp.number, format_.pixel, static_cast<std::uint32_t>(format_.width),
-                                static_cast<std::uint32_t>(format_.height), crc32(pixels)});
+                                static_cast<std::uint32_t>(format_.height), crc32(pixels), format_.link});
         FramePieces pieces(header, pixels, cut_, link_->out_packet_bytes());
         ++(send(pieces, queue) ? written : failed);
     }
@@ -185,7 +185,7 @@ private:
 VideoSinkResult open_bulk_sink(const std::string& text, const VideoSinkOptions& o) {
     auto spec = parse_bulk(text);
     if (!spec) return spec.error();
-    if (frame_bytes(o.format) > std::numeric_limits<std::uint32_t>::max())
+    if (link_bytes(o.format) > std::numeric_limits<std::uint32_t>::max())
         return Error{"bulk:" + text + ": expected frames below 4 GiB"};
     auto writer = std::make_unique<BulkWriter>(*std::move(spec), o.format);
     if (auto opened = writer->open(); !opened) {

@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "drivers/video/backends.h"
+#include "protocols/video/link_layout.h"
 
 namespace narpa {
 namespace {
@@ -126,6 +127,31 @@ constexpr std::array kVideoSources{
 };
 constexpr std::span<const VideoSourceKind> kVideoSourceTable{kVideoSources};
 
+/// Frames of samples from those of a link.
+class SamplesOfLink final : public VideoSource {
+public:
+    SamplesOfLink(std::unique_ptr<VideoSource> link, const VideoFormat& format)
+        : link_(std::move(link)), format_(format), laid_out_(link_bytes(format)) {}
+    bool receive(std::span<std::uint8_t> frame, std::int64_t timeout_ns) override {
+        const bool received = link_->receive(laid_out_, timeout_ns);
+        if (received) samples_of_link(format_, laid_out_, frame);
+        status_ = link_->status();
+        counters_ = link_->counters();
+        return received;
+    }
+    std::string description() const override { return link_->description(); }
+
+private:
+    std::unique_ptr<VideoSource> link_;
+    VideoFormat format_;
+    std::vector<std::uint8_t> laid_out_;
+};
+
+std::string unfit(const VideoFormat& format) {
+    const std::string what = unfit_size(format.pixel, format.width, format.height);
+    return what.empty() ? unfit_width(format.pixel, format.link, format.width) : what;
+}
+
 Error no_such_path(const std::string& spec) {
     Error error{"video source \"" + spec + "\": no such file or device", {}, 0, 0, ErrorKind::missing};
     if (!spec.starts_with("/dev/"))
@@ -138,11 +164,16 @@ Error no_such_path(const std::string& spec) {
 void VideoWriter::write(std::span<const std::uint8_t> item, const WriteQueue& queue) noexcept {
     FrameStamp stamp;
     std::memcpy(&stamp, item.data(), sizeof stamp);
-    write_frame(item.subspan(sizeof stamp), stamp, queue);
+    const auto samples = item.subspan(sizeof stamp);
+    if (laid_out_.empty()) return write_frame(samples, stamp, queue);
+    lay_out(format_, samples, laid_out_);
+    write_frame(laid_out_, stamp, queue);
 }
 
 std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, const VideoFormat& format,
                                        WhenFull full, std::string description) {
+    writer->format_ = format;
+    if (!format.link.is_samples()) writer->laid_out_.resize(link_bytes(format));
     return std::make_unique<QueuedSink>(std::move(writer), format, full, std::move(description));
 }
 
@@ -160,8 +191,7 @@ VideoSinkResult open_video_sink(std::string_view spec, const VideoFormat& format
                                 const std::optional<VideoControls>& controls) {
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
         return Error{"video: width, height and frame period must be positive"};
-    if (const std::string what = unfit_size(format.pixel, format.width, format.height); !what.empty())
-        return Error{"video: " + what};
+    if (const std::string what = unfit(format); !what.empty()) return Error{"video: " + what};
     const std::string text(spec), name = "video sink \"" + text + "\": ";
     const VideoSinkKind* kind = find_kind(kVideoSinkTable, text);
     if (kind == nullptr) return Error{name + "expected " + forms_of(kVideoSinkTable)};
@@ -174,12 +204,15 @@ VideoSinkResult open_video_sink(std::string_view spec, const VideoFormat& format
 
 VideoSourceResult open_video_source(std::string_view spec, const VideoFormat& format) {
     if (format.width <= 0 || format.height <= 0) return Error{"video: width and height must be positive"};
+    if (const std::string what = unfit(format); !what.empty()) return Error{"video: " + what};
     const std::string text(spec), name = "video source \"" + text + "\": ";
     const VideoSourceKind* kind = find_kind(kVideoSourceTable, text);
     if (kind == nullptr && type_of(text) == 0 && !text.empty()) return no_such_path(text);
     if (kind == nullptr) return Error{name + "expected " + forms_of(kVideoSourceTable)};
     try {
-        return kind->open(kind->rest_of(text), format);
+        auto source = kind->open(kind->rest_of(text), format);
+        if (!source || format.link.is_samples()) return source;
+        return std::unique_ptr<VideoSource>(std::make_unique<SamplesOfLink>(*std::move(source), format));
     } catch (const std::exception& e) {  // no memory
         return Error{name + e.what(), {}, 0, 0, ErrorKind::missing};
     }

@@ -29,7 +29,7 @@ public:
         : Y4mWriter(o.format, std::move(header)),
           listener_(std::move(listener)),
           waits_(o.full == WhenFull::wait),
-          bytes_most_(frame_bytes(o.format) + kTextBytes) {
+          bytes_most_(link_bytes(o.format) + kTextBytes) {
         clients_.reserve(kVideoClients);
     }
 

@@ -35,7 +35,7 @@ public:
     [[nodiscard]] double ns_of_a_frame() const noexcept {
         const double headers =
             static_cast<double>(cut_.count() * (kFrameDatagramHeaderBytes + kIpUdpBytes + kEthernetBytes));
-        return ns_per_byte_ * (static_cast<double>(frame_bytes(format_)) + headers);
+        return ns_per_byte_ * (static_cast<double>(link_bytes(format_)) + headers);
     }
 
     void write_frame(std::span<const std::uint8_t> frame, const FrameStamp& stamp,
@@ -43,6 +43,7 @@ public:
         FrameDatagramHeader header{.t_ns = stamp.t_ns,
                                    .frame = stamp.number,
                                    .pixel = format_.pixel,
+                                   .link = format_.link,
                                    .width = static_cast<std::uint16_t>(format_.width),
                                    .height = static_cast<std::uint16_t>(format_.height),
                                    .count = cut_.count()};

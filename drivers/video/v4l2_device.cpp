@@ -9,11 +9,11 @@
 namespace narpa {
 namespace {
 
-std::uint32_t fourcc(PixelFormat pixel) noexcept {
+std::uint32_t fourcc(const VideoFormat& format) noexcept {
+    const std::string_view text = link_code(format.pixel, format.link);
     std::uint32_t code = 0;
     for (int i = 0; i < 4; ++i)
-        code |= std::uint32_t{static_cast<std::uint8_t>(row_of(pixel).v4l2[static_cast<std::size_t>(i)])}
-                << (8 * i);
+        code |= std::uint32_t{static_cast<std::uint8_t>(text[static_cast<std::size_t>(i)])} << (8 * i);
     return code;
 }
 
@@ -44,18 +44,18 @@ v4l2_pix_format v4l2_wanted_format(const VideoFormat& format) noexcept {
     v4l2_pix_format pix{};
     pix.width = static_cast<std::uint32_t>(format.width);
     pix.height = static_cast<std::uint32_t>(format.height);
-    pix.pixelformat = fourcc(format.pixel);
+    pix.pixelformat = fourcc(format);
     pix.field = V4L2_FIELD_NONE;
-    pix.bytesperline =
-        static_cast<std::uint32_t>(format.width) * static_cast<std::uint32_t>(bytes_per_pixel(format.pixel));
-    pix.sizeimage = static_cast<std::uint32_t>(frame_bytes(format));
+    pix.bytesperline = static_cast<std::uint32_t>(link_row_bytes(format));
+    pix.sizeimage = static_cast<std::uint32_t>(link_bytes(format));
     pix.colorspace = format.pixel == PixelFormat::yuyv ? V4L2_COLORSPACE_SMPTE170M : V4L2_COLORSPACE_SRGB;
     return pix;
 }
 
 v4l2_pix_format v4l2_carrier_format(const VideoFormat& format) noexcept {
     VideoFormat carrier = format;
-    if (is_bayer(format.pixel) && is_16_bit(format.pixel)) carrier.pixel = PixelFormat::y16;
+    if (is_bayer(format.pixel) && is_16_bit(format.pixel) && format.link.is_samples())
+        carrier.pixel = PixelFormat::y16;
     return v4l2_wanted_format(carrier);
 }
 

@@ -36,8 +36,8 @@ Status open_cameras(const World& world, const RunOptions& o, OpenSensors& out) {
     for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
         const Camera& c = scene.cameras[i];
         auto sinks = open_sinks<VideoSink>(o.video, i, scene.cameras, "camera", scene.file, [&](const auto& spec) {
-            return open_video_sink(spec, {c.width, c.height, c.format, c.period_ns},
-                                   o.lockstep ? WhenFull::wait : WhenFull::drop, controls_of(c, !o.bus.empty()));
+            return open_video_sink(spec, c.video_format(), o.lockstep ? WhenFull::wait : WhenFull::drop,
+                                   controls_of(c, !o.bus.empty()));
         });
         if (!sinks) return sinks.error();
         if (sinks->empty()) continue;

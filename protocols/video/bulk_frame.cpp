@@ -26,10 +26,10 @@ std::array<std::uint8_t, kBulkHeaderBytes> encode_bulk_header(const BulkFrameHea
     put_le(&b[BulkAt::kLength], static_cast<std::uint16_t>(kBulkHeaderBytes));
     put_le(&b[BulkAt::kTime], static_cast<std::uint64_t>(h.t_ns));
     put_le(&b[BulkAt::kNumber], h.number);
-    std::ranges::copy(row_of(h.pixel).v4l2, &b[BulkAt::kFormat]);
+    std::ranges::copy(link_code(h.pixel, h.link), &b[BulkAt::kFormat]);
     put_le(&b[BulkAt::kWidth], h.width);
     put_le(&b[BulkAt::kHeight], h.height);
-    put_le(&b[BulkAt::kRow], static_cast<std::uint32_t>(h.width * bytes_per_pixel(h.pixel)));
+    put_le(&b[BulkAt::kRow], static_cast<std::uint32_t>(link_row_bytes(h.width, h.pixel, h.link)));
     put_le(&b[BulkAt::kSize], static_cast<std::uint32_t>(h.pixel_bytes()));
     put_le(&b[BulkAt::kPixelsCrc], h.pixels_crc32);
     put_le(&b[BulkAt::kCrc], crc32(std::span(b).first(BulkAt::kCrc)));
@@ -47,13 +47,13 @@ std::optional<BulkFrameHeader> decode_bulk_header(std::span<const std::uint8_t> 
     h.t_ns = static_cast<std::int64_t>(get_le<std::uint64_t>(&b[BulkAt::kTime]));
     h.number = get_le<std::uint32_t>(&b[BulkAt::kNumber]);
     const std::string code(&b[BulkAt::kFormat], &b[BulkAt::kFormat] + 4);
-    const std::optional<PixelFormat> pixel = pixel_format_from(code, &PixelFormatRow::v4l2);
-    if (!pixel) return std::nullopt;
-    h.pixel = *pixel;
+    const std::optional<LinkPixels> pixels = link_from_code(code);
+    if (!pixels) return std::nullopt;
+    h.pixel = pixels->samples, h.link = pixels->layout;
     h.width = get_le<std::uint32_t>(&b[BulkAt::kWidth]);
     h.height = get_le<std::uint32_t>(&b[BulkAt::kHeight]);
     h.pixels_crc32 = get_le<std::uint32_t>(&b[BulkAt::kPixelsCrc]);
-    const std::uint64_t row = std::uint64_t{h.width} * bytes_per_pixel(h.pixel);
+    const std::uint64_t row = link_row_bytes(h.width, h.pixel, h.link);
     const auto told_row = get_le<std::uint32_t>(&b[BulkAt::kRow]),
                told_size = get_le<std::uint32_t>(&b[BulkAt::kSize]);
     if (told_size == 0 || told_row != row || told_size != row * h.height) return std::nullopt;

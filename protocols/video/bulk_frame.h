@@ -18,12 +18,13 @@ struct BulkFrameHeader {
     std::int64_t t_ns = 0;  ///< mid-exposure, simulation clock
     std::uint32_t number =
         0;  ///< of the frame, as on CAN and in the embedded line; a gap means frames that are lost
-    PixelFormat pixel = PixelFormat::grey;
-    std::uint32_t width = 0, height = 0;  ///< px
-    std::uint32_t pixels_crc32 = 0;       ///< of all bytes behind the header
+    PixelFormat pixel = PixelFormat::grey;  ///< of the samples
+    std::uint32_t width = 0, height = 0;    ///< px
+    std::uint32_t pixels_crc32 = 0;         ///< of all bytes behind the header
+    LinkLayout link{};                      ///< of the samples
     /// Of all bytes behind the header; rows have no padding.
     [[nodiscard]] std::uint64_t pixel_bytes() const noexcept {
-        return std::uint64_t{width} * height * bytes_per_pixel(pixel);
+        return std::uint64_t{link_row_bytes(width, pixel, link)} * height;
     }
     friend bool operator==(const BulkFrameHeader&, const BulkFrameHeader&) = default;
 };

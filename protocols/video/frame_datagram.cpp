@@ -35,9 +35,7 @@ std::int32_t newer_by(std::uint32_t number, std::uint32_t than) noexcept {
 }  // namespace
 
 FrameCut::FrameCut(const VideoFormat& format, std::size_t datagram_bytes)
-    : row_bytes_(static_cast<std::size_t>(format.width) * bytes_per_pixel(format.pixel)),
-      rows_(static_cast<std::size_t>(format.height)),
-      part_bytes_(row_bytes_) {
+    : row_bytes_(link_row_bytes(format)), rows_(static_cast<std::size_t>(format.height)), part_bytes_(row_bytes_) {
     assert(datagram_bytes >= kFrameDatagramHeaderBytes + kPartUnit);
     const std::size_t most = datagram_bytes - kFrameDatagramHeaderBytes;
     if (row_bytes_ <= most) {
@@ -66,10 +64,10 @@ std::array<std::uint8_t, kFrameDatagramHeaderBytes> encode_frame_datagram(
     put_le(&b[DatagramAt::kLength], static_cast<std::uint16_t>(kFrameDatagramHeaderBytes));
     put_le(&b[DatagramAt::kTime], static_cast<std::uint64_t>(h.t_ns));
     put_le(&b[DatagramAt::kFrame], h.frame);
-    std::ranges::copy(row_of(h.pixel).v4l2, &b[DatagramAt::kFormat]);
+    std::ranges::copy(link_code(h.pixel, h.link), &b[DatagramAt::kFormat]);
     put_le(&b[DatagramAt::kWidth], h.width);
     put_le(&b[DatagramAt::kHeight], h.height);
-    put_le(&b[DatagramAt::kRowBytes], static_cast<std::uint32_t>(h.width * bytes_per_pixel(h.pixel)));
+    put_le(&b[DatagramAt::kRowBytes], static_cast<std::uint32_t>(link_row_bytes(h.width, h.pixel, h.link)));
     put_le(&b[DatagramAt::kIndex], h.index);
     put_le(&b[DatagramAt::kCount], h.count);
     put_le(&b[DatagramAt::kRow], h.row);
@@ -88,18 +86,19 @@ std::optional<FrameDatagramHeader> decode_frame_datagram(std::span<const std::ui
         get_le<std::uint32_t>(&b[DatagramAt::kCrc]) != crc_of(b, bytes))
         return std::nullopt;
     const std::string code(&b[DatagramAt::kFormat], &b[DatagramAt::kFormat] + 4);
-    const std::optional<PixelFormat> pixel = pixel_format_from(code, &PixelFormatRow::v4l2);
-    if (!pixel) return std::nullopt;
+    const std::optional<LinkPixels> pixels = link_from_code(code);
+    if (!pixels) return std::nullopt;
     const FrameDatagramHeader h{.t_ns = static_cast<std::int64_t>(get_le<std::uint64_t>(&b[DatagramAt::kTime])),
                                 .frame = get_le<std::uint32_t>(&b[DatagramAt::kFrame]),
-                                .pixel = *pixel,
+                                .pixel = pixels->samples,
+                                .link = pixels->layout,
                                 .width = get_le<std::uint16_t>(&b[DatagramAt::kWidth]),
                                 .height = get_le<std::uint16_t>(&b[DatagramAt::kHeight]),
                                 .index = get_le<std::uint32_t>(&b[DatagramAt::kIndex]),
                                 .count = get_le<std::uint32_t>(&b[DatagramAt::kCount]),
                                 .row = get_le<std::uint32_t>(&b[DatagramAt::kRow]),
                                 .byte_in_row = get_le<std::uint32_t>(&b[DatagramAt::kByte])};
-    const std::uint64_t row_bytes = std::uint64_t{h.width} * bytes_per_pixel(h.pixel);
+    const std::uint64_t row_bytes = link_row_bytes(h.width, h.pixel, h.link);
     const std::uint64_t end = h.row * row_bytes + h.byte_in_row + bytes.size();
     if (get_le<std::uint32_t>(&b[DatagramAt::kRowBytes]) != row_bytes || h.index >= h.count ||
         h.byte_in_row >= row_bytes || end > row_bytes * h.height || h.count > row_bytes * h.height)
@@ -108,7 +107,7 @@ std::optional<FrameDatagramHeader> decode_frame_datagram(std::span<const std::ui
 }
 
 FrameAssembly::FrameAssembly(const VideoFormat& format) : format_(format) {
-    for (Part& part : parts_) part.frame.bytes.resize(frame_bytes(format));
+    for (Part& part : parts_) part.frame.bytes.resize(link_bytes(format));
 }
 
 /// Frame `number` has ended; those between the one before and this one never came.
@@ -148,8 +147,10 @@ FrameAssembly::Part* FrameAssembly::part_of(const FrameDatagramHeader& h) {
 
 const FrameAssembly::Frame* FrameAssembly::take(std::span<const std::uint8_t> datagram) {
     const std::optional<FrameDatagramHeader> h = decode_frame_datagram(datagram);
-    const VideoFormat its{h ? h->width : 0, h ? h->height : 0, h ? h->pixel : PixelFormat::grey, format_.period_ns};
-    const bool same = its.width == format_.width && its.height == format_.height && its.pixel == format_.pixel;
+    const VideoFormat its{h ? h->width : 0, h ? h->height : 0, h ? h->pixel : PixelFormat::grey, format_.period_ns,
+                          h ? h->link : LinkLayout{}};
+    const bool same = its.width == format_.width && its.height == format_.height &&
+                      link_code(its.pixel, its.link) == link_code(format_.pixel, format_.link);
     if (h && !same) other_format_ = its;
     Part* const part = h && same ? part_of(*h) : nullptr;
     if (part == nullptr || h->count != part->came.size() || part->came[h->index]) {
@@ -157,8 +158,7 @@ const FrameAssembly::Frame* FrameAssembly::take(std::span<const std::uint8_t> da
         return nullptr;
     }
     const auto bytes = datagram.subspan(kFrameDatagramHeaderBytes);
-    const std::size_t row_bytes = static_cast<std::size_t>(format_.width) * bytes_per_pixel(format_.pixel);
-    std::ranges::copy(bytes, &part->frame.bytes[h->row * row_bytes + h->byte_in_row]);
+    std::ranges::copy(bytes, &part->frame.bytes[h->row * link_row_bytes(format_) + h->byte_in_row]);
     part->came[h->index] = true;
     if (--part->left > 0) return nullptr;
     part->came.clear();

@@ -16,9 +16,10 @@
 namespace narpa {
 
 struct FrameDatagramHeader {
-    std::int64_t t_ns = 0;    ///< mid-exposure, simulation clock
-    std::uint32_t frame = 0;  ///< its number, as on CAN and in the embedded line
-    PixelFormat pixel = PixelFormat::grey;
+    std::int64_t t_ns = 0;                   ///< mid-exposure, simulation clock
+    std::uint32_t frame = 0;                 ///< its number, as on CAN and in the embedded line
+    PixelFormat pixel = PixelFormat::grey;   ///< of the samples
+    LinkLayout link{};                       ///< of the samples
     std::uint16_t width = 0, height = 0;     ///< px
     std::uint32_t index = 0, count = 0;      ///< of this datagram, from 0; of the frame's
     std::uint32_t row = 0, byte_in_row = 0;  ///< where the bytes belong; rows have no padding
@@ -74,7 +75,7 @@ public:
     struct Frame {
         std::uint32_t number = 0;
         std::int64_t t_ns = 0;
-        std::vector<std::uint8_t> bytes;
+        std::vector<std::uint8_t> bytes;  ///< link_bytes of the format
     };
 
     explicit FrameAssembly(const VideoFormat& format);

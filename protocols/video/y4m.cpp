@@ -37,9 +37,10 @@ void for_each_sample(const VideoFormat& f, const auto& copy) {
 }  // namespace
 
 Result<std::string> y4m_stream_header(const VideoFormat& format) {
-    const std::string_view colour = row_of(format.pixel).y4m;
+    const std::string_view colour = link_y4m(format.pixel, format.link);
     if (colour.empty())
-        return Error{"Y4M cannot hold " + std::string(name(format.pixel)) + " frames; it holds GREY, Y16 and YUYV"};
+        return Error{"Y4M cannot hold " + std::string(link_name(format.pixel, format.link)) +
+                     " frames; it holds GREY, Y10, Y12, Y16 and YUYV"};
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
         return Error{"Y4M needs a positive width, height and frame period"};
     if (std::string what = unfit_size(format.pixel, format.width, format.height); !what.empty())
@@ -64,7 +65,7 @@ Status check_y4m_stream_header(std::string_view line, const VideoFormat& format)
     const std::string found =
         size_text(tag_value(tags, 'W'), tag_value(tags, 'H'), colour.empty() ? "420" : colour);
     const std::string expected =
-        size_text(std::to_string(format.width), std::to_string(format.height), row_of(format.pixel).y4m);
+        size_text(std::to_string(format.width), std::to_string(format.height), link_y4m(format.pixel, format.link));
     if (found != expected) return Error{"the stream has " + found + " frames, expected " + expected};
     if (const std::string_view order = tag_value(tags, 'I'); !order.empty() && order != "p" && order != "?")
         return Error{"the stream is interlaced (I" + std::string(order) + "), expected progressive frames"};

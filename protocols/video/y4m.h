@@ -1,8 +1,9 @@
 /// protocols/video/y4m.h - YUV4MPEG2 ("Y4M"): the headers and the order of the samples.
 ///
-/// GREY is Cmono, Y16 is Cmono16 (little-endian), YUYV is C422 (three planes: the same samples in another order).
-/// RGB24 and Bayer mosaics have no place in Y4M. Cmono and Cmono16 are extensions that ffmpeg and mjpegtools write.
-/// Source: yuv4mpeg(5) of mjpegtools; ffmpeg's "yuv4mpegpipe" (de)muxer.
+/// GREY is Cmono, Y16 is Cmono16 (little-endian), Y10 and Y12 are Cmono10 and Cmono12, YUYV is C422 (three planes:
+/// the same samples in another order). RGB24, packed pixels and Bayer mosaics have no place in Y4M. Cmono and its
+/// like are extensions that ffmpeg and mjpegtools write. Source: yuv4mpeg(5) of mjpegtools; ffmpeg's "yuv4mpegpipe"
+/// (de)muxer.
 #pragma once
 
 #include <cstdint>

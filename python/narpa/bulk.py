@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from . import pixels as pixel_formats
+from .pixels import FORMATS
+
 MAGIC, VERSION, HEADER_BYTES = b"NRPF", 1, 48
-FORMATS = {"GREY": (1, np.uint8), "Y16 ": (1, "<u2"), "YUYV": (2, np.uint8), "RGB3": (3, np.uint8),
-           "RGGB": (1, np.uint8), "GRBG": (1, np.uint8), "GBRG": (1, np.uint8), "BA81": (1, np.uint8),
-           "RG16": (1, "<u2"), "GR16": (1, "<u2"), "GB16": (1, "<u2"), "BYR2": (1, "<u2")}  # fmt: skip
 
 
 class Header(NamedTuple):
@@ -32,8 +32,7 @@ def decode(data):
         return None
     version, length, t_ns, number, fourcc, *sizes, crc = struct.unpack_from("<HHqI4s5II", data, 4)
     header = Header(t_ns, number, fourcc.decode("latin-1"), *sizes)
-    channels, kind = FORMATS.get(header.format, (0, np.uint8))
-    row = header.width * channels * np.dtype(kind).itemsize
+    row = pixel_formats.row_bytes(header.format, header.width)
     good = (version, length, crc) == (VERSION, HEADER_BYTES, zlib.crc32(data[: HEADER_BYTES - 4]))
     return header if good and row == header.row_bytes and row * header.height == header.size > 0 else None
 
@@ -66,7 +65,5 @@ def read(file):
         if len(data) < header.size or zlib.crc32(data) != header.crc:
             held = held[1:]  # the next frame may begin within the corrupted one
             continue
-        channels, kind = FORMATS[header.format]
-        shape = (header.height, header.width) + ((channels,) if channels > 1 else ())
-        yield header, np.frombuffer(data, kind).reshape(shape)
+        yield header, pixel_formats.array(header.format, header.width, header.height, data)
         held = held[HEADER_BYTES + header.size :]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bulk import FORMATS
+from . import pixels as pixel_formats
 
 MAGIC, VERSION, HEADER_BYTES = b"NRPD", 1, 52
 RECEIVE_BUFFER = 8 << 20  # of the socket; the kernel grants no more than net.core.rmem_max
@@ -44,8 +44,7 @@ def decode(data):
         return None
     version, length, t_ns, frame, fourcc, *rest, crc = struct.unpack_from("<HHqI4sHHIIIIII", data, 4)
     header = Header(t_ns, frame, fourcc.decode("latin-1"), *rest)
-    channels, kind = FORMATS.get(header.format, (0, np.uint8))
-    row_bytes = header.width * channels * np.dtype(kind).itemsize
+    row_bytes = pixel_formats.row_bytes(header.format, header.width)
     end = header.row * row_bytes + header.byte_in_row + len(data) - HEADER_BYTES
     good = (version, length) == (VERSION, HEADER_BYTES) and crc == zlib.crc32(data[HEADER_BYTES:], zlib.crc32(data[:48]))
     placed = row_bytes == header.row_bytes > header.byte_in_row and end <= row_bytes * header.height
@@ -94,9 +93,8 @@ class Assembly:
         frames = []
         for number in numbers:
             header, data, came = self.begun.pop(number)
-            channels, kind = FORMATS[header.format]
-            shape = (header.height, header.width) + ((channels,) if channels > 1 else ())
-            frames.append(Frame(header, np.frombuffer(bytes(data), kind).reshape(shape), header.count - len(came)))
+            pixels = pixel_formats.array(header.format, header.width, header.height, bytes(data))
+            frames.append(Frame(header, pixels, header.count - len(came)))
             self.ended = number
         return frames
 

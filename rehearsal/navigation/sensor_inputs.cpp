@@ -80,7 +80,7 @@ Result<SensorInputs> open_sensor_inputs(const Scenario& scenario, const SceneMod
     SensorInputs inputs;
     for (std::size_t i = 0; i < frames_from->size(); ++i) {
         const Camera& c = model.scene().cameras[model.cameras()[i]];
-        const VideoFormat format{c.width, c.height, c.format, c.period_ns};
+        const VideoFormat format = c.video_format();
         auto source = open_video_source((*frames_from)[i], format);
         if (!source) return source.error();
         inputs.cameras.push_back({model.cameras()[i], *std::move(source), frame_bytes(format)});

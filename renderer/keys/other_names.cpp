@@ -19,30 +19,17 @@ std::string plain(std::string_view name) {
 
 /// A pixel format of another tool (plain()), and narpa's.
 struct OtherFormat {
-    std::string_view name, format, note = "";
+    std::string_view name, format;
 };
 constexpr OtherFormat kOtherFormats[]{
-    {"y10", "Y16", " Its values are left-justified: 64 times those of 10 bits."},
-    {"y12", "Y16", " Its values are left-justified: 16 times those of 12 bits."},
-    {"y14", "Y16", " Its values are left-justified: 4 times those of 14 bits."},
-    {"mono8", "GREY"},
-    {"gray8", "GREY"},
-    {"y8", "GREY"},
-    {"mono16", "Y16"},
-    {"gray16le", "Y16"},
-    {"rgb8", "RGB24"},
-    {"rgb3", "RGB24"},
-    {"yuy2", "YUYV"},
-    {"yuyv422", "YUYV"},
-    {"yuv422yuy2", "YUYV"},
-    {"bayerrggb8", "RGGB8"},
-    {"bayergrbg8", "GRBG8"},
-    {"bayergbrg8", "GBRG8"},
-    {"bayerbggr8", "BGGR8"},
-    {"bayerrggb16", "RGGB16"},
-    {"bayergrbg16", "GRBG16"},
-    {"bayergbrg16", "GBRG16"},
-    {"bayerbggr16", "BGGR16"},
+    {"mono10", "Y10"},         {"gray10le", "Y10"},       {"mono12", "Y12"},
+    {"gray12le", "Y12"},       {"raw10", "Y10P"},         {"raw12", "Y12P"},
+    {"mono8", "GREY"},         {"gray8", "GREY"},         {"y8", "GREY"},
+    {"mono16", "Y16"},         {"gray16le", "Y16"},       {"rgb8", "RGB24"},
+    {"rgb3", "RGB24"},         {"yuy2", "YUYV"},          {"yuyv422", "YUYV"},
+    {"yuv422yuy2", "YUYV"},    {"bayerrggb8", "RGGB8"},   {"bayergrbg8", "GRBG8"},
+    {"bayergbrg8", "GBRG8"},   {"bayerbggr8", "BGGR8"},   {"bayerrggb16", "RGGB16"},
+    {"bayergrbg16", "GRBG16"}, {"bayergbrg16", "GBRG16"}, {"bayerbggr16", "BGGR16"},
 };
 
 }  // namespace
@@ -178,7 +165,7 @@ std::string key_meant(std::string_view unknown, const std::vector<std::string>& 
 std::string word_meant(std::string_view unknown, const std::vector<std::string_view>& words) {
     const auto other = std::ranges::find(kOtherFormats, plain(unknown), &OtherFormat::name);
     if (other != std::end(kOtherFormats) && std::ranges::find(words, other->format) != words.end())
-        return fmt::format("; did you mean \"{}\"?{}", other->format, other->note);
+        return fmt::format("; did you mean \"{}\"?", other->format);
     return did_you_mean(unknown, std::vector<std::string>(words.begin(), words.end()));
 }
 

@@ -41,8 +41,9 @@ struct Camera {
     int width = 640, height = 480;
     std::shared_ptr<const CameraModel> model{};  ///< its projection; never null in a scene that was read
     std::int64_t period_ns = 100'000'000;        ///< 1 / rate_hz
-    PixelFormat format = PixelFormat::grey;
-    bool embedded_line = false;  ///< the last row carries the frame's identity and ledger
+    PixelFormat format = PixelFormat::grey;      ///< of its frames
+    LinkLayout link{};                           ///< of the frames that sinks send
+    bool embedded_line = false;                  ///< the last row carries the frame's identity and ledger
     LatePolicy late = LatePolicy::late;
     double white_radiance = 0;         ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
     std::optional<Detector> detector;  ///< none: an ideal sensor without noise (see white_radiance)
@@ -50,6 +51,7 @@ struct Camera {
     std::optional<CameraControlLimits> control{};
     Optics optics{};
 
+    [[nodiscard]] VideoFormat video_format() const { return {width, height, format, period_ns, link}; }
     [[nodiscard]] ImagePlane plane() const { return {width, height, model}; }
     /// Valid while the camera stays as it is.
     operator ImageSensor() const noexcept {  // NOLINT(google-explicit-constructor)

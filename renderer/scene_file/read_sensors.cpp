@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/constants.h"
+#include "protocols/video/embedded_line.h"
 #include "renderer/assets/images/point_spread_file.h"
 #include "renderer/detector/detector_stage.h"
 #include "renderer/optics/optical_effect.h"
@@ -34,7 +35,7 @@ constexpr TableKeys kShutterKeys{.rows = kShutterRows, .kinds = [] {
                                  }};
 constexpr std::array<std::string_view, 4> kLatePolicyNames{"drop", "repeat", "late", "blank"};
 constexpr TableKey kCameraRows[]{
-    {"format", rows::choice<kPixelFormatNames>()},
+    {"format", rows::choice<kCameraFormatNames>()},
     {"rate_hz", rows::number({.low = 1e-3, .high = 10000})},
     {"embedded_line", rows::boolean()},
     {"late_policy", rows::choice<kLatePolicyNames>()},
@@ -93,6 +94,30 @@ std::optional<CameraControlLimits> read_control(TableReader& camera, const Camer
     return control;
 }
 
+/// One name says what the samples are and how links lay them out.
+void read_format(TableReader& table, Camera& camera) {
+    const std::optional<std::size_t> index = table.word("format");
+    if (!index) return;
+    if (*index < kPixelFormats.size()) {
+        camera.format = kPixelFormats[*index].format;
+        return;
+    }
+    const LinkFormatRow& row = kLinkFormats[*index - kPixelFormats.size()];
+    camera.format = row.samples;
+    camera.link = row.layout;
+    if (const std::string what = unfit_width(camera.format, camera.link, camera.width); !what.empty())
+        table.fail("format", what);
+}
+/// The link's pixels are the ADC's values.
+void check_bits_of_link(TableReader& table, Camera& camera) {
+    if (camera.link.is_samples()) return;
+    if (camera.embedded_line) camera.link.first_bytes_kept = kEmbeddedLineBytes;
+    if (!camera.detector || camera.detector->bits != camera.link.bits)
+        table.fail("format",
+                   fmt::format("{} has pixels of {} bits, expected a [camera.detector] with bits = {}",
+                               link_name(camera.format, camera.link), camera.link.bits, camera.link.bits));
+}
+
 /// The radiance that an ideal sensor maps to full scale: that of a white Lambert surface that faces the Sun or,
 /// without a Sun, of the brightest band of the ambient light. 0 if there is neither.
 double white_radiance(const Scene& scene) {
@@ -129,7 +154,7 @@ Camera read_camera(TableReader& table, TakenNames& names, SceneReading& reading)
         table.fail("rate_hz", fmt::format("a period of {} ms, expected at least the budget_ms of [render], {}",
                                           static_cast<double>(camera.period_ns) * 1e-6,
                                           static_cast<double>(scene.render.budget_ns) * 1e-6));
-    table.read("format", camera.format);
+    read_format(table, camera);
     if (const std::string what = unfit_size(camera.format, camera.width, camera.height); !what.empty())
         table.fail("format", what);
     table.read("embedded_line", camera.embedded_line);
@@ -137,6 +162,7 @@ Camera read_camera(TableReader& table, TakenNames& names, SceneReading& reading)
         table.fail("embedded_line", "takes the last row, expected a resolution of at least 2 rows");
     table.read("late_policy", camera.late);
     camera.detector = read_detector(table, camera.period_ns);
+    check_bits_of_link(table, camera);
     camera.shutter = read_shutter(table, camera);
     camera.control = read_control(table, camera);
     const auto read_image = [&](TableReader& optics, const std::string& key) -> std::shared_ptr<PointSpreadImage> {

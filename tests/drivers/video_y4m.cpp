@@ -90,6 +90,28 @@ TEST(Y4mSink, FfmpegReadsTheFileByteForByte) {
     }
 }
 
+/// Right-justified pixels, as ffmpeg knows them too.
+TEST(Y4mSink, FfmpegReadsPixelsOf10And12Bits) {
+    if (!test::is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
+    const test::TemporaryFolder folder;
+    for (const std::uint8_t bits : {std::uint8_t{10}, std::uint8_t{12}}) {
+        const VideoFormat format{66, 34, PixelFormat::y16, 33'366'667, {LinkLayout::Kind::right, bits}};
+        const std::string path = folder / "out.y4m";
+        Bytes sent = noise_frame(format, bits), expected(sent.size());
+        for (std::size_t i = 0; i < sent.size(); i += 2) {
+            const unsigned value = (sent[i] | sent[i + 1] << 8) >> (16 - bits);
+            expected[i] = static_cast<std::uint8_t>(value), expected[i + 1] = static_cast<std::uint8_t>(value >> 8);
+        }
+        {
+            const auto sink = opened(path, format, WhenFull::wait);
+            EXPECT_TRUE(sink->send(sent));
+        }
+        const Bytes read = test::output_of("ffmpeg -v error -nostdin -i " + path + " -f rawvideo -pix_fmt gray" +
+                                           std::to_string(bits) + "le -");
+        EXPECT_TRUE(read == expected) << int{bits};
+    }
+}
+
 TEST(Y4mSink, FfmpegReadsTheFifo) {
     if (!test::is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
     const test::TemporaryFolder folder;
@@ -273,7 +295,10 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
         {"nowhere", kGrey, ErrorKind::bad_input,
          "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, FILE.y4m, an existing FIFO, or none"},
         {"", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
-        {folder / "out.y4m", {8, 8, PixelFormat::rgb24, 1}, ErrorKind::bad_input, "it holds GREY, Y16 and YUYV"},
+        {folder / "out.y4m",
+         {8, 8, PixelFormat::rgb24, 1},
+         ErrorKind::bad_input,
+         "it holds GREY, Y10, Y12, Y16 and YUYV"},
         {folder / "out.y4m", {8, 8, PixelFormat::bggr16, 1}, ErrorKind::bad_input, "cannot hold BGGR16 frames"},
         {folder / "no/such/folder.y4m", kGrey, ErrorKind::missing, "cannot write: No such file or directory"},
         {"none", {0, 8, PixelFormat::grey, 1}, ErrorKind::bad_input, "must be positive"},

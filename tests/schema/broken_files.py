@@ -229,7 +229,7 @@ BROKEN = [
     # cameras
     ('name = "c"', ""), ("look_at = [0.0, 30.0, 1.0]", "lookat = [0.0, 30.0, 1.0]"), ("resolution = [128, 96]", "resolution = [64, 0]"),
     ("resolution = [128, 96]", "resolution = [64, 16385]"), ("fov_horizontal_deg = 20", "fov_horizontal_deg = 360"),
-    ("fov_horizontal_deg = 20", "fov_deg = 20"), ('format = "Y16"', 'format = "Y12"'), ("rate_hz = 5", "rate_hz = 1e5"),
+    ("fov_horizontal_deg = 20", "fov_deg = 20"), ('format = "Y16"', 'format = "Y11"'), ("rate_hz = 5", "rate_hz = 1e5"),
     ("embedded_line = true", "embedded_line = 1"), ('late_policy = "drop"', 'late_policy = "wait"'), ("veiling_glare = 0.01", "veiling_glare = 1"),
     ('distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0]}', 'distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0, 0.0]}'),
     ('distortion = {model = "fisheye", coefficients = [0.0, 0.0, 0.0, 0.0]}', 'distortion = {model = "fov", coefficients = [0.0, 0.0, 0.0, 0.0]}'),

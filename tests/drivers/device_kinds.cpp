@@ -93,7 +93,7 @@ TEST(DeviceKinds, TheManualNamesAll) {
             EXPECT_NE(manual.find(word), std::string::npos) << word << " of " << help;
             at = end + 3;
         }
-    EXPECT_EQ(kinds, 6U + 7U + 5U);
+    EXPECT_EQ(kinds, 6U + 8U + 5U);
 }
 
 }  // namespace

@@ -198,7 +198,8 @@ TEST(VideoSource, BadSourcesSayWhatIsWrong) {
         ErrorKind kind;
         std::string says;
     } cases[] = {
-        {"", kGreySource, ErrorKind::bad_input, "expected /dev/videoN, bridge:PORT, FILE.y4m, or an existing FIFO"},
+        {"", kGreySource, ErrorKind::bad_input,
+         "expected /dev/videoN, bridge:PORT, udp:PORT, FILE.y4m, or an existing FIFO"},
         {folder / "frames.bin", kGreySource, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "fifo", kGreySource, ErrorKind::missing, "try: mkfifo " + (folder / "fifo")},
         {folder / "colour.y4m",

@@ -293,7 +293,8 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
         std::string says;
     } cases[] = {
         {"nowhere", kGrey, ErrorKind::bad_input,
-         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, FILE.y4m, an existing FIFO, or none"},
+         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, udp:HOST:PORT, FILE.y4m, an existing FIFO, or "
+         "none"},
         {"", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "out.y4m",
          {8, 8, PixelFormat::rgb24, 1},

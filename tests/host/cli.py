@@ -452,7 +452,7 @@ def check_devices():
     found = {f["name"]: f["there"] for f in json.loads(done.stdout)["machine"]}
     expect(all(found[name] for name in ("slcan:0", str(film), "tcp:0", "udp:127.0.0.1:2368", "none")), f"check finds {found}")
     expect(not film.parent.exists(), "check makes no file")
-    expect_refusal(2, "udp:239.74.163.2: needs the option that says what it is, expected --can udp:239.74.163.2 or --lidar LIDAR=udp:239.74.163.2", "check", support.SCENE, "udp:239.74.163.2")
+    expect_refusal(2, "udp:239.74.163.2: needs the option that says what it is, expected --can udp:239.74.163.2, --video CAMERA=udp:239.74.163.2, or --lidar LIDAR=udp:239.74.163.2", "check", support.SCENE, "udp:239.74.163.2")
     expect_refusal(2, 'no camera named "eye"', "check", support.SCENE, "--video", "eye=none")
     expect_refusal(2, f"--lidar {support.LIDAR}=can", "check", support.SCENE, "--lidar", f"{support.LIDAR}=can")
     expect_refusal(2, "expected /dev/videoN", "check", support.SCENE, "--video", f"{support.CAMERA}=film.mov")

@@ -20,7 +20,7 @@ namespace {
 constexpr int kMtu = 1500, kMinMtu = 128, kMaxMtu = 65535;
 constexpr int kMbitPerSecond = 1000, kMaxMbitPerSecond = 100'000;
 /// Ethernet's part of a datagram on the wire: preamble, header, checksum, gap.
-constexpr std::size_t kEthernetBytes = 8 + 14 + 4 + 12;
+constexpr std::size_t kEthernetOverheadBytes = 8 + 14 + 4 + 12;
 /// What goes without a wait: shorter waits are longer than asked for.
 constexpr std::int64_t kBurst_ns = 100'000;
 
@@ -34,7 +34,7 @@ public:
 
     [[nodiscard]] double ns_of_a_frame() const noexcept {
         const double headers =
-            static_cast<double>(cut_.count() * (kFrameDatagramHeaderBytes + kIpUdpBytes + kEthernetBytes));
+            static_cast<double>(cut_.count() * (kFrameDatagramHeaderBytes + kIpUdpBytes + kEthernetOverheadBytes));
         return ns_per_byte_ * (static_cast<double>(link_bytes(format_)) + headers);
     }
 
@@ -53,7 +53,7 @@ public:
             header.row = part.row, header.byte_in_row = part.byte_in_row;
             if (!send(header, frame.subspan(part.begin, part.bytes))) return;
             due_ns += std::llround(ns_per_byte_ * static_cast<double>(part.bytes + kFrameDatagramHeaderBytes +
-                                                                      kIpUdpBytes + kEthernetBytes));
+                                                                      kIpUdpBytes + kEthernetOverheadBytes));
             if (queue.time_left_ms() == 0) {
                 ++failed;
                 return;

@@ -67,7 +67,7 @@ VideoSinkResult open_y4m_fifo(const std::string& path, const VideoSinkOptions& o
 VideoSourceResult open_v4l2_source(const std::string& path, const VideoFormat& format);
 /// `address`: [HOST:]PORT to listen at for the host that attaches the bridge.
 VideoSourceResult open_bridge_source(const std::string& address, const VideoFormat& format);
-/// `text`: udp_listener.h.
+/// `text`: udp_listener.h; the options of a sink have no effect.
 VideoSourceResult open_udp_video_source(const std::string& text, const VideoFormat& format);
 VideoSourceResult open_y4m_source(const std::string& path, const VideoFormat& format);
 

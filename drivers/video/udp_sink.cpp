@@ -21,7 +21,7 @@ constexpr int kMtu = 1500, kMinMtu = 128, kMaxMtu = 65535;
 constexpr int kMbitPerSecond = 1000, kMaxMbitPerSecond = 100'000;
 /// Ethernet's part of a datagram on the wire: preamble, header, checksum, gap.
 constexpr std::size_t kEthernetOverheadBytes = 8 + 14 + 4 + 12;
-/// What goes without a wait: shorter waits are longer than asked for.
+/// What goes without a wait, because shorter waits are longer than asked for.
 constexpr std::int64_t kBurst_ns = 100'000;
 
 class UdpVideoWriter final : public VideoWriter {
@@ -49,17 +49,18 @@ public:
                                    .count = cut_.count()};
         std::int64_t due_ns = monotonic_ns();
         for (; header.index < header.count; ++header.index) {
+            if (header.index > 0 && queue.time_left_ms() == 0) {
+                ++failed;
+                return;
+            }
             const FrameCut::Part part = cut_[header.index];
             header.row = part.row, header.byte_in_row = part.byte_in_row;
             if (!send(header, frame.subspan(part.begin, part.bytes))) return;
             due_ns += std::llround(ns_per_byte_ * static_cast<double>(part.bytes + kFrameDatagramHeaderBytes +
                                                                       kIpUdpBytes + kEthernetOverheadBytes));
-            if (queue.time_left_ms() == 0) {
-                ++failed;
-                return;
-            }
             const std::int64_t early_ns = due_ns - monotonic_ns();
             if (early_ns > kBurst_ns) wait_ready({}, early_ns);
+            if (early_ns < -kBurst_ns) due_ns -= early_ns + kBurst_ns;  // what a stall has cost is not made up for
         }
         ++written;
     }

@@ -59,7 +59,8 @@ private:
 }  // namespace
 
 VideoSourceResult open_udp_video_source(const std::string& text, const VideoFormat& format) {
-    auto listener = listen_udp(text, "video source \"udp:" + text + "\"");
+    // The options of a sink, so that one text names both ends of a rehearsal.
+    auto listener = listen_udp(text.substr(0, text.find(',')), "video source \"udp:" + text + "\"");
     if (!listener) return listener.error();
     return std::unique_ptr<VideoSource>(std::make_unique<UdpVideoSource>(*std::move(listener), format));
 }

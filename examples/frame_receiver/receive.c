@@ -25,7 +25,7 @@ static uint32_t u16_at(const uint8_t *b) { return (uint32_t)b[0] | (uint32_t)b[1
 static uint32_t u32_at(const uint8_t *b) { return u16_at(b) | u16_at(b + 2) << 16; }
 static int64_t i64_at(const uint8_t *b) { return (int64_t)((uint64_t)u32_at(b) | (uint64_t)u32_at(b + 4) << 32); }
 
-/* CRC-32 of IEEE 802.3, bit by bit but with a table of 256. `crc` continues an earlier run. */
+/* CRC-32 of IEEE 802.3, a byte at a time. `crc` continues an earlier run. */
 static uint32_t crc32_of(const uint8_t *bytes, size_t n, uint32_t crc) {
     static uint32_t table[256];
     if (table[1] == 0)

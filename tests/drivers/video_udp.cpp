@@ -60,7 +60,7 @@ TEST(UdpVideo, FramesArriveAsTheyWereSent) {
         for (const char* options : {"", ",mtu=128", ",mtu=9000,mbit_s=10000", ",mtu=65535,ttl=3"}) {
             const VideoFormat format{64, 48, pixel, 100'000'000};
             const std::string port = OwnPort().release();
-            const auto source = frames_at(port, format);
+            const auto source = frames_at(port + options, format);
             const auto sink = frames_to(port + options, format);
             ASSERT_TRUE(source && sink);
             Bytes came(frame_bytes(format));

@@ -34,15 +34,10 @@ def install_readers():
 
 def fly(name):
     """A flight in lockstep with an MCAP file; frame i shows POSES[i]. Returns the file's path and the run's summary."""
-    wire, port, path = support.Wire(), support.free_port(), folder / f"{name}.mcap"
+    port, path = support.free_port(), folder / f"{name}.mcap"
     with support.Run(support.SCENE, "--can", f"slcan:{port}", "--video", f"{support.CAMERA}={folder}/{name}.y4m", "--lidar",
                      f"{support.LIDAR}=none", "--lockstep", "--log", folder / name, "--mcap", path) as run:
-        bus = support.open_bus(run, interface="slcan", channel=f"socket://127.0.0.1:{port}", sleep_after_open=0.1)
-        for frame, pose in enumerate(POSES):
-            for message in wire.command(pose, frame * support.PERIOD_NS, counter=frame):
-                bus.send(message)
-            support.await_ledger(bus, wire, frame)
-        bus.shutdown()
+        support.command_frames(run, port, POSES)
         return path, run.stop()
 
 

@@ -219,6 +219,17 @@ def await_ledger(bus, wire, frame, seconds=30):
     expect(False, f"the ledger of frame {frame} arrives within {seconds} s")
 
 
+def command_frames(run, port, poses):
+    """Commands a run in lockstep over slcan at `port`, one pose for each frame; returns when it has made the last one."""
+    wire = Wire()
+    bus = open_bus(run, interface="slcan", channel=f"socket://127.0.0.1:{port}", sleep_after_open=0.1)
+    for frame, pose in enumerate(poses):
+        for message in wire.command(pose, frame * PERIOD_NS, counter=frame):
+            bus.send(message)
+        await_ledger(bus, wire, frame)
+    bus.shutdown()
+
+
 def open_bus(run, seconds=30, **settings):
     """Opens a python-can bus after narpa has. On a bus without a server, commands sent earlier would be lost."""
     import can

@@ -54,7 +54,6 @@ def check(pixel_format):
     scene = support.scene_with(folder, pixel_format)
     port, can_port = support.free_port(), support.free_port()
     commands = readers(pixel_format, port, folder)
-    wire = support.Wire()
     with support.Run(scene, "--can", f"slcan:{can_port}", "--video", f"{support.CAMERA}=tcp:{port}", "--lockstep") as run:
         run.wait_for(re.escape(f"Y4M at tcp://127.0.0.1:{port}"))
         started = {name: subprocess.Popen(list(map(str, command))) for name, command in commands.items()}
@@ -63,12 +62,7 @@ def check(pixel_format):
                 break
             time.sleep(0.05)
         expect(connections(port) == len(started), f"{', '.join(started)} connect")
-        bus = support.open_bus(run, interface="slcan", channel=f"socket://127.0.0.1:{can_port}", sleep_after_open=0.1)
-        for frame, pose in enumerate(POSES):
-            for message in wire.command(pose, frame * support.PERIOD_NS, counter=frame):
-                bus.send(message)
-            support.await_ledger(bus, wire, frame)
-        bus.shutdown()
+        support.command_frames(run, can_port, POSES)
         print(run.stop()["cameras"][0]["sinks"])
     wanted = [support.render(scene, frame, pose, folder) for frame, pose in enumerate(POSES)]
     size = support.WIDTH * support.HEIGHT * support.PIXEL_BYTES[pixel_format]

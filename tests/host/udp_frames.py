@@ -65,14 +65,9 @@ class Relay(threading.Thread):
 
 def fly(folder, scene, sink):
     """The frames of a run in lockstep, as `narpa render` has them."""
-    can_port, wire = support.free_port(), support.Wire()
+    can_port = support.free_port()
     with support.Run(scene, "--can", f"slcan:{can_port}", "--video", f"{support.CAMERA}={sink}", "--lockstep") as run:
-        bus = support.open_bus(run, interface="slcan", channel=f"socket://127.0.0.1:{can_port}", sleep_after_open=0.1)
-        for frame, pose in enumerate(POSES):
-            for message in wire.command(pose, frame * support.PERIOD_NS, counter=frame):
-                bus.send(message)
-            support.await_ledger(bus, wire, frame)
-        bus.shutdown()
+        support.command_frames(run, can_port, POSES)
         print(run.stop()["cameras"][0]["sinks"])
     return [support.render(scene, frame, pose, folder) for frame, pose in enumerate(POSES)]
 

@@ -1,10 +1,12 @@
 /// renderer/scene/camera.h - a camera of a scene: its mount, projection, optics, detector and timing.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "base/pixel_format.h"
 #include "base/pose.h"
@@ -33,6 +35,10 @@ struct CameraControlLimits {
 
 enum class LatePolicy : std::uint8_t { drop, repeat, late, blank };
 
+/// A frame of known pixels in place of the image, to test the link and its driver: protocols/video/test_pattern.h.
+enum class TestPattern : std::uint8_t { none, counter, prbs };
+inline constexpr std::array<std::string_view, 3> kTestPatterns{"none", "counter", "prbs"};
+
 struct Camera {
     std::string name;
     int mount = -1;  ///< body it rides on; -1 is the world
@@ -44,6 +50,7 @@ struct Camera {
     PixelFormat format = PixelFormat::grey;      ///< of its frames
     LinkLayout link{};                           ///< of the frames that sinks send
     bool embedded_line = false;                  ///< the last row carries the frame's identity and ledger
+    TestPattern test_pattern = TestPattern::none;
     LatePolicy late = LatePolicy::late;
     double white_radiance = 0;         ///< radiance that an ideal sensor maps to full scale, W m^-2 sr^-1
     std::optional<Detector> detector;  ///< none: an ideal sensor without noise (see white_radiance)

@@ -160,6 +160,38 @@ struct RenderSettings {
     double command_ahead_max_s = 60;  ///< commands for a time further ahead are refused
 };
 
+/// The clock of real-time runs, and what follows from it.
+struct TimeSettings {
+    enum class Source : std::uint8_t {
+        free,    ///< starts with the run; UTC is the scene's epoch plus simulation time
+        system,  ///< starts at a whole UTC second of the system's clock, which time stamps then follow
+    };
+    static constexpr std::array<std::string_view, 2> kSourceNames{"free", "system"};
+    /// When the dynamics begin again with earlier times.
+    enum class OnRestart : std::uint8_t { refuse, new_run };
+    static constexpr std::array<std::string_view, 2> kOnRestartNames{"refuse", "new_run"};
+
+    Source source = Source::free;
+    OnRestart on_restart = OnRestart::refuse;
+};
+
+/// What narpa does on CAN besides commands and telemetry.
+struct CanSettings {
+    std::int64_t sync_period_ns = 0;  ///< of CANopen's SYNC, sent by narpa; 0: not sent
+    std::int64_t time_period_ns = 0;  ///< of CANopen's TIME; 0: not sent
+    std::uint32_t time_id = 0x100;    ///< of TIME (CiA 301)
+
+    /// Of two buses (ECSS-E-ST-50-15C, redundancy).
+    enum class Redundancy : std::uint8_t {
+        hot,   ///< both carry everything: what comes first counts
+        cold,  ///< one is in use; the other takes over after its master's heartbeat has been missing
+    };
+    static constexpr std::array<std::string_view, 2> kRedundancyNames{"hot", "cold"};
+    Redundancy redundancy = Redundancy::hot;
+    std::uint32_t heartbeat_id = 0;             ///< of the master that selects the bus; 0: any frame counts
+    std::int64_t heartbeat_timeout_ns = 500'000'000;  ///< after which the other bus is used
+};
+
 struct Scene {
     std::string name, file;
     std::vector<std::string> overrides{};  ///< KEY=VALUE of `--set`, in place of the file's
@@ -177,6 +209,8 @@ struct Scene {
     std::vector<Camera> cameras;
     std::vector<Lidar> lidars;
     RenderSettings render;
+    TimeSettings time{};
+    CanSettings can{};
     std::vector<std::string> warnings;  ///< told once when the scene is read: "12 degenerate triangles dropped"
 };
 

@@ -21,7 +21,7 @@ Result<DeviceOptions::Outputs> split(const std::vector<std::string>& texts, std:
 }  // namespace
 
 void DeviceOptions::add_to(Parser c) {
-    c.option("--can", bus, can_bus_help()).type_name("BUS");
+    c.option("--can", bus, can_bus_help()).type_name("BUS").joined_by('+');
     c.option("--video", video_texts, video_sink_help() + "; may be given many times")
         .type_name("CAMERA=SINK")
         .repeatable();

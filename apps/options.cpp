@@ -81,6 +81,10 @@ Option Option::shows_default() const {
 Option Option::repeatable() const {
     return Option(option_->take_all()->allow_extra_args(false));
 }
+Option Option::joined_by(char separator) const {
+    return Option(
+        option_->multi_option_policy(CLI::MultiOptionPolicy::Join)->delimiter(separator)->allow_extra_args(false));
+}
 Option Option::comma_separated() const {
     return Option(option_->delimiter(',')->allow_extra_args(false));
 }

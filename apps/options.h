@@ -37,6 +37,8 @@ public:
     Option shows_default() const;
     /// May be given many times, with one value each.
     Option repeatable() const;
+    /// May be given several times: one value, of the parts joined by this character.
+    Option joined_by(char separator) const;
     /// One value, of comma-separated parts.
     Option comma_separated() const;
     /// Takes `least` to `most` values.

@@ -43,4 +43,12 @@ Result<ListenAddress> parse_listen_address(std::string_view text) {
     return at;
 }
 
+std::string to_string(const ListenAddress& at) {
+    return at.host + ":" + std::to_string(at.port);
+}
+
+bool is_loopback(const ListenAddress& at) {
+    return at.host.starts_with("127.");
+}
+
 }  // namespace narpa

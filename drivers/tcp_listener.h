@@ -23,5 +23,9 @@ struct ListenAddress {
     std::uint16_t port = 0;
 };
 [[nodiscard]] Result<ListenAddress> parse_listen_address(std::string_view text);
+/// "ADDRESS:PORT".
+[[nodiscard]] std::string to_string(const ListenAddress& at);
+/// Only programs of this machine reach it: 127.0.0.0/8.
+[[nodiscard]] bool is_loopback(const ListenAddress& at);
 
 }  // namespace narpa

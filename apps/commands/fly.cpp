@@ -297,7 +297,7 @@ Command add_fly(Parser app) {
              "Poses of bodies over time: CSV with the columns of a run's CAMERA.truth.csv, or TOML that names "
              "orbit and attitude ephemerides (CCSDS OEM, AEM) and tables")
         .required();
-    c.option("--can", o->bus, can_bus_help()).type_name("BUS").required();
+    c.option("--can", o->bus, can_bus_help()).type_name("BUS").joined_by('+').required();
     c.option("--id", o->ids,
              "Base identifier of a body's commands, the scene's can_id (default: 0x100, for a file with one body)")
         .type_name("BODY=ID")

@@ -220,8 +220,10 @@ Command add_rehearse(Parser app) {
         c.flag("--gather", o->gather, "Fly nothing: summarise the runs of DIR that there are").needs(runs);
     gather.excludes(shard);
     o->slurm.add_to(c, "1000").needs(runs).excludes(jobs).excludes(shard).excludes(gather);
-    c.option("--can", r.bus, "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2 | usb:[ADAPTER]")
+    c.option("--can", r.bus,
+             "slcan:PORT (0: a free one) | vcan0 | udp:239.74.163.2 | usb:[ADAPTER]; twice: two redundant buses")
         .type_name("BUS")
+        .joined_by('+')
         .shows_default();
     c.option("--video", o->video, "A device instead of a FIFO, like nav=/dev/video10; may be given many times")
         .type_name("CAMERA=DEVICE")

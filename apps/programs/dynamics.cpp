@@ -46,7 +46,7 @@ void add_options(Arguments& a, const cli::Parser& p) {
     p.option("--set", a.overrides, "Value of a key of the scenario or its scene, as `narpa rehearse` takes it")
         .type_name("KEY=VALUE")
         .repeatable();
-    p.option("--can", a.bus, can_bus_help()).type_name("BUS").required();
+    p.option("--can", a.bus, can_bus_help()).type_name("BUS").joined_by('+').required();
     p.flag("--lockstep", a.options.lockstep,
            "Each control period waits for its actuator command; the same seed gives the same bytes");
     p.option("--seed", a.seed, "Of all random draws (default: the scenario's)");

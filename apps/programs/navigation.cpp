@@ -57,7 +57,7 @@ void add_options(Arguments& a, const cli::Parser& p) {
     p.option("--set", a.overrides, "Value of a key of the scenario or its scene, as `narpa rehearse` takes it")
         .type_name("KEY=VALUE")
         .repeatable();
-    p.option("--can", a.node.bus, can_bus_help()).type_name("BUS").required();
+    p.option("--can", a.node.bus, can_bus_help()).type_name("BUS").joined_by('+').required();
     p.option("--video", a.video, video_source_help() + ", for each of the scenario's cameras")
         .type_name("CAMERA=SOURCE")
         .repeatable();

@@ -7,22 +7,26 @@
 #include <string>
 
 #include "drivers/can/can_bus.h"
+#include "drivers/tcp_listener.h"
 
 namespace narpa {
 
 using CanBusResult = Result<std::unique_ptr<CanBus>>;
 
 CanBusResult open_socketcan(const std::string& interface, CanRole role);
-/// `port`: of the hub; for a hub, 0 takes a free one, which description() names. A client returns once the hub has
-/// opened the channel: no frame of the bus is missed after that.
-CanBusResult open_slcan(const std::string& port, CanRole role);
-CanBusResult open_slcan_hub(std::uint16_t port);
-CanBusResult open_slcan_client(std::uint16_t port);
+/// `text`: `[ADDRESS:]PORT` of the hub, on loopback without an address. A hub takes a free port for 0, which
+/// description() names. A client returns once the hub has opened the channel: no frame of the bus is missed after
+/// that.
+CanBusResult open_slcan(const std::string& text, CanRole role);
+CanBusResult open_slcan_hub(const ListenAddress& at);
+CanBusResult open_slcan_client(const ListenAddress& at);
 /// `group`: an IPv4 multicast address.
 CanBusResult open_udp_multicast(const std::string& group, CanRole role);
 /// A USB-CAN adapter through libusb. `text`: drivers/can/usb_spec.h. A missing one is an error; one that is pulled
 /// out later is looked for once a second.
 CanBusResult open_gs_usb(const std::string& text, CanRole role);
+/// Two buses, whose texts are joined by a plus sign: redundant_bus.h.
+CanBusResult open_redundant(const std::string& text, CanRole role);
 /// Within one process. The client opens it first, then the hub: a hub without a client is an error.
 CanBusResult open_memory_bus(const std::string& name, CanRole role);
 /// A hub reads the log, a client writes it.
@@ -34,6 +38,12 @@ CanBusResult open_candump(const std::string& path, CanRole role);
     for (const int length : {12, 16, 20, 24, 32, 48})
         if (size <= length) return static_cast<std::uint8_t>(length);
     return 64;
+}
+
+/// The frame at that length; what is added is zero.
+[[nodiscard]] inline CanFrame padded(CanFrame frame) noexcept {
+    if (frame.fd) frame.size = fd_length(frame.size);
+    return frame;
 }
 
 /// True for frames that every bus can carry: lengths and identifiers in range, no error reports, no remote FD

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/result.h"
 #include "drivers/device_kind.h"
@@ -25,7 +26,7 @@ struct CanCounters {
     std::uint64_t send_drops = 0;        ///< queue full, no client, interface down, FD on a classic bus
     std::uint64_t receive_overflow = 0;  ///< frames that the kernel or a full buffer dropped before they were read
     std::uint64_t malformed = 0;         ///< lines or datagrams that are not a CAN frame
-    std::uint64_t not_carried = 0;       ///< frames of kinds that the bus does not carry: CAN FD over slcan, CAN XL
+    std::uint64_t not_carried = 0;       ///< frames of kinds that the bus does not carry: CAN XL
     std::uint64_t error_frames = 0;      ///< controller error reports
     std::uint64_t bus_off = 0;           ///< times that the controller went bus-off
     std::uint64_t interface_down = 0;    ///< times that the interface or the connection went away
@@ -41,6 +42,24 @@ struct ReceivedFrame {
 struct CanAddress {
     std::string bus;  ///< BUS of open_can_bus; empty: the one with which this side opened it
     std::string pty;  ///< pseudo-terminal; empty: none
+};
+
+/// How two buses stand for one (redundant_bus.h).
+struct BusRedundancy {
+    /// Hot: both carry everything, and of two equal frames the first one counts. Cold: one bus is in use, A first;
+    /// the other one takes over when the master is heard there after it has been silent on the bus in use.
+    bool is_cold = false;
+    std::uint32_t heartbeat_id = 0;  ///< cold: of the master, 11 bits; 0: any frame is its sign of life
+    std::int64_t heartbeat_timeout_ns = 500'000'000;  ///< cold: the silence after which another bus is taken
+};
+
+/// What one of two buses has carried.
+struct BusUse {
+    std::string bus;               ///< CanBus::description
+    std::uint64_t used = 0;        ///< frames that were taken from it
+    std::uint64_t duplicates = 0;  ///< hot: frames that the other bus had brought before
+    std::uint64_t idle = 0;        ///< cold: frames that came while the other bus was in use
+    CanCounters counters{};
 };
 
 class CanBus {
@@ -66,6 +85,15 @@ public:
     /// The bus as a server of clients; null: it has none.
     [[nodiscard]] virtual ClientHub* clients() noexcept { return nullptr; }
     [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
+
+    // Of two buses that stand for one.
+
+    /// Before the first frame.
+    virtual void set_redundancy(const BusRedundancy& /*redundancy*/) noexcept {}
+    /// What each of two has carried; empty: it is one.
+    [[nodiscard]] virtual std::vector<BusUse> uses() const { return {}; }
+    /// How often the other bus was taken into use.
+    [[nodiscard]] virtual std::uint64_t switches() const noexcept { return 0; }
 
 protected:
     CanCounters counters_{};

@@ -1,5 +1,5 @@
-// The client side of slcan: connects to a hub on loopback, opens the channel, and returns when the hub
-// does.
+// The client side of slcan: connects to a hub, opens the channel, and returns when the hub does.
+#include <arpa/inet.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
@@ -17,18 +17,21 @@ namespace {
 
 enum class Connection : std::uint8_t { made, under_way, refused };
 
-/// Starts to connect; `under_way` when the answer takes a moment even on loopback.
-Connection connect_to(std::uint16_t port, Descriptor& fd) noexcept {
+sockaddr_in address_of(const ListenAddress& hub) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(hub.port);
+    ::inet_pton(AF_INET, hub.host.c_str(), &address.sin_addr);
+    return address;
+}
+
+/// Starts to connect; `under_way` when the answer takes a moment, as it may even on loopback.
+Connection connect_to(const sockaddr_in& hub, Descriptor& fd) noexcept {
     fd = Descriptor(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (!fd) return Connection::refused;
     const int on = 1;
     ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
-        return Connection::made;
+    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&hub), sizeof hub) == 0) return Connection::made;
     return errno == EINPROGRESS ? Connection::under_way : Connection::refused;
 }
 
@@ -76,7 +79,9 @@ Status greet(int fd) {
 class SlcanClient final : public CanBus {
 public:
     /// `fd`: connected, with the channel open.
-    SlcanClient(Descriptor fd, std::uint16_t port) : port_(port) { stream_.attach(std::move(fd)); }
+    SlcanClient(Descriptor fd, const ListenAddress& hub) : hub_(hub), address_(address_of(hub)) {
+        stream_.attach(std::move(fd));
+    }
     ~SlcanClient() override {
         if (stream_ && stream_.write("C\r")) stream_.flush();
     }
@@ -109,7 +114,7 @@ public:
 
     bool send(const CanFrame& frame) noexcept override {
         std::array<char, kSlcanMaxLine> line;
-        const std::size_t n = sendable(frame) ? encode_slcan(frame, line) : 0;
+        const std::size_t n = sendable(frame) ? encode_slcan(padded(frame), line) : 0;
         const bool taken = n > 0 && ready() && stream_.write({line.data(), n});
         ++(taken ? counters_.sent : counters_.send_drops);
         return taken;
@@ -125,9 +130,7 @@ public:
     }
 
     [[nodiscard]] bool carries_fd() const noexcept override { return false; }
-    [[nodiscard]] std::string description() const override {
-        return "slcan: client of 127.0.0.1:" + std::to_string(port_);
-    }
+    [[nodiscard]] std::string description() const override { return "slcan: client of " + to_string(hub_); }
 
 private:
     /// Opens the channel of a new connection; does not wait for the answers.
@@ -144,7 +147,7 @@ private:
         if (connecting_)
             connection = outcome(connecting_.get(), 0);
         else if (retry_.due())
-            connection = connect_to(port_, connecting_);
+            connection = connect_to(address_, connecting_);
         if (connection == Connection::made) begin(std::move(connecting_));
         if (connection == Connection::refused) connecting_.reset();
         return static_cast<bool>(stream_);
@@ -157,27 +160,27 @@ private:
 
     SlcanStream stream_{};
     Descriptor connecting_{};
-    std::uint16_t port_;
+    ListenAddress hub_;
+    sockaddr_in address_;
     std::uint64_t overlong_ = 0;
     RetryTimer retry_{};
 };
 
 }  // namespace
 
-CanBusResult open_slcan_client(std::uint16_t port) {
-    const std::string spec = "slcan:" + std::to_string(port);
+CanBusResult open_slcan_client(const ListenAddress& at) {
+    const std::string hub = to_string(at), spec = "slcan:" + (is_loopback(at) ? std::to_string(at.port) : hub);
     const auto failed = [&](const std::string& what) {
         return Error{.what = spec + ": " + what,
                      .kind = ErrorKind::missing,
                      .remedy = "narpa run SCENE --can " + spec + " --video CAMERA=none   (start the hub first)"};
     };
     Descriptor fd;
-    Connection connection = connect_to(port, fd);
+    Connection connection = connect_to(address_of(at), fd);
     if (connection == Connection::under_way) connection = outcome(fd.get(), kSecond_ns);
-    const std::string hub = "127.0.0.1:" + std::to_string(port);
     if (connection != Connection::made) return failed("cannot connect to " + hub + ": " + std::strerror(errno));
     if (const Status greeted = greet(fd.get()); !greeted) return failed(hub + ": " + greeted.error().what);
-    return CanBusResult(std::make_unique<SlcanClient>(std::move(fd), port));
+    return CanBusResult(std::make_unique<SlcanClient>(std::move(fd), at));
 }
 
 }  // namespace narpa

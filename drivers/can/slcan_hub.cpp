@@ -1,5 +1,5 @@
-// The slcan hub: clients connect over TCP on loopback or over one pseudo-terminal; all of them and narpa share the
-// bus. Wire: protocols/can/slcan.h.
+// The slcan hub: clients connect over TCP or over one pseudo-terminal; all of them and narpa share the bus.
+// Wire: protocols/can/slcan.h.
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -13,7 +13,6 @@
 #include <cstring>
 #include <vector>
 
-#include "base/text/read_number.h"
 #include "drivers/can/buses.h"
 #include "drivers/can/client_hub.h"
 #include "drivers/can/slcan_stream.h"
@@ -28,6 +27,7 @@ struct Client {
     SlcanStream stream{};
     bool open = false;             ///< it has sent O or L: it is on the bus
     bool listens_only = false;     ///< it has sent L: it sends no frames
+    bool takes_fd = false;         ///< it has sent Y (data bit rate) or a CAN FD frame: it is sent such frames
     std::uint64_t connection = 0;  ///< serial number of the connection
     bool commands = false;         ///< it has sent a command
     std::uint64_t overlong = 0;
@@ -65,10 +65,10 @@ constexpr std::int64_t kTimeout_ns = 1000'000'000;
 
 class SlcanHub final : public CanBus, public ClientHub {
 public:
-    SlcanHub(Descriptor listener, std::uint16_t port, Descriptor pty_near, Descriptor pty_far, std::string pty_path)
+    SlcanHub(Descriptor listener, ListenAddress at, Descriptor pty_near, Descriptor pty_far, std::string pty_path)
         : listener_(std::move(listener)),
           pty_far_(std::move(pty_far)),
-          port_(port),
+          at_(std::move(at)),
           pty_path_(std::move(pty_path)) {
         clients_[kPty].stream.attach(std::move(pty_near));
     }
@@ -100,8 +100,8 @@ public:
 
     bool send(const CanFrame& frame) noexcept override {
         std::array<char, kSlcanMaxLine> line;
-        const std::size_t n = sendable(frame) ? encode_slcan(frame, line) : 0;
-        const Delivery delivery = n > 0 ? deliver({line.data(), n}, nullptr) : Delivery{};
+        const std::size_t n = sendable(frame) ? encode_slcan(padded(frame), line) : 0;
+        const Delivery delivery = n > 0 ? deliver({line.data(), n}, frame.fd, nullptr) : Delivery{};
         if (delivery.taken > 0)
             ++counters_.sent;
         else if (delivery.missed == 0)
@@ -127,9 +127,13 @@ public:
 
     [[nodiscard]] bool carries_fd() const noexcept override { return false; }
     [[nodiscard]] std::string description() const override {
-        return "slcan: 127.0.0.1:" + std::to_string(port_) + " and " + pty_path_;
+        return "slcan: " + to_string(at_) + " and " + pty_path_ +
+               (is_loopback(at_) ? "" : "; warning: any machine that reaches this address can send commands");
     }
-    [[nodiscard]] CanAddress address() const override { return {"slcan:" + std::to_string(port_), pty_path_}; }
+    [[nodiscard]] CanAddress address() const override {
+        const bool here = is_loopback(at_) || at_.host == "0.0.0.0";
+        return {"slcan:" + (here ? std::to_string(at_.port) : to_string(at_)), pty_path_};
+    }
 
 private:
     struct Delivery {
@@ -172,7 +176,8 @@ private:
             for (std::size_t i = 0; i < kTcpClients; ++i) {
                 if (clients_[i].stream) continue;
                 clients_[i].stream.attach(std::move(fd));
-                clients_[i].open = clients_[i].commands = clients_[i].listens_only = false;
+                Client& joined = clients_[i];
+                joined.open = joined.commands = joined.listens_only = joined.takes_fd = false;
                 clients_[i].connection = ++connections_;
                 clients_[i].overlong = 0;
                 break;
@@ -202,8 +207,8 @@ private:
                 if (!client.open) client.commands = false;
                 if (&client == &clients_[kPty] && !client.open) discard_unread(client);
                 return answer(client, "\r");
+            case 'Y': client.takes_fd = true; [[fallthrough]];
             case 'S':
-            case 'Y':
                 return line.size() == 2 && line[1] >= '0' && line[1] <= '9' ? answer(client, "\r") : refuse(client);
             case 'V': return bare ? answer(client, "V1013\r") : refuse(client);
             case 'N': return bare ? answer(client, "NNRP1\r") : refuse(client);
@@ -214,24 +219,23 @@ private:
 
     void take_frame(Client& client, std::string_view line) noexcept {
         ReceivedFrame received;
-        if (is_slcan_fd(line)) {
-            ++counters_.not_carried;
-            return answer(client, "\a");
-        }
         if (!client.open || client.listens_only || !decode_slcan(line, received.frame)) return refuse(client);
         received.t_received_ns = monotonic_ns();
+        client.takes_fd = client.takes_fd || received.frame.fd;
         queue_.push({received, static_cast<std::size_t>(&client - clients_.data()), client.connection});
         answer(client, received.frame.extended ? "Z\r" : "z\r");
         std::array<char, kSlcanMaxLine> text;
         const std::size_t n = encode_slcan(received.frame, text);
-        deliver({text.data(), n}, &client);
+        deliver({text.data(), n}, received.frame.fd, &client);
     }
 
-    /// Sends to every open client but `from`. A client whose queue is full misses the line; this is counted.
-    Delivery deliver(std::string_view line, const Client* from) noexcept {
+    /// Sends to every open client but `from`, CAN FD frames to those that take them. A client whose queue is full
+    /// misses the line; this is counted.
+    Delivery deliver(std::string_view line, bool fd, const Client* from) noexcept {
         Delivery delivery;
         for (Client& client : clients_)
-            if (client.open && &client != from) ++(client.stream.write(line) ? delivery.taken : delivery.missed);
+            if (client.open && &client != from && (client.takes_fd || !fd))
+                ++(client.stream.write(line) ? delivery.taken : delivery.missed);
         counters_.send_drops += delivery.missed;
         return delivery;
     }
@@ -251,7 +255,7 @@ private:
     }
 
     Descriptor listener_, pty_far_;
-    std::uint16_t port_;
+    ListenAddress at_;
     std::string pty_path_;
     std::array<Client, kClients> clients_{};
     FrameQueue queue_{};
@@ -267,21 +271,26 @@ Error failed(const std::string& what) {
 }  // namespace
 
 CanBusResult open_slcan(const std::string& text, CanRole role) {
-    std::uint16_t port = 0;
+    const auto at = parse_listen_address(text);
     // Port 0 lets the kernel choose; only a listening socket can do that.
-    if (!read_number(text, port) || (port == 0 && role == CanRole::client))
-        return Error{"slcan:" + text + ": expected a TCP port from 1 to 65535, such as slcan:29537"};
-    return role == CanRole::hub ? open_slcan_hub(port) : open_slcan_client(port);
+    if (!at || (at->port == 0 && role == CanRole::client))
+        return Error{"slcan:" + text +
+                     ": expected [ADDRESS:]PORT with an IPv4 address and a TCP port from 1 to 65535, such as "
+                     "slcan:29537 or slcan:192.168.1.10:29537"};
+    return role == CanRole::hub ? open_slcan_hub(*at) : open_slcan_client(*at);
 }
 
-CanBusResult open_slcan_hub(std::uint16_t port) {
-    const std::string name = "slcan:" + std::to_string(port);
-    auto listener = listen_tcp("127.0.0.1", port);
+CanBusResult open_slcan_hub(const ListenAddress& at) {
+    const std::string name = "slcan:" + to_string(at);
+    auto listener = listen_tcp(at.host, at.port);
     if (!listener) {
         Error error = listener.error();
         error.what = name + ": " + error.what;
-        error.remedy = "another port, such as slcan:" + std::to_string(port < 65535 ? port + 1 : 29537) +
-                       ", or see who has it: ss -ltnp 'sport = :" + std::to_string(port) + "'";
+        ListenAddress other = at;
+        other.port = static_cast<std::uint16_t>(at.port < 65535 ? at.port + 1 : 29537);
+        error.remedy =
+            "another port, such as slcan:" + (is_loopback(at) ? std::to_string(other.port) : to_string(other)) +
+            ", or see who has it: ss -ltnp 'sport = :" + std::to_string(at.port) + "'";
         return error;
     }
 
@@ -296,8 +305,8 @@ CanBusResult open_slcan_hub(std::uint16_t port) {
     if (!far || ::tcgetattr(far.get(), &mode) != 0) return failed(name + ": " + path.data());
     ::cfmakeraw(&mode);
     if (::tcsetattr(far.get(), TCSANOW, &mode) != 0) return failed(name + ": " + path.data());
-    return CanBusResult(std::make_unique<SlcanHub>(std::move(listener->fd), listener->port, std::move(near),
-                                                   std::move(far), path.data()));
+    return CanBusResult(std::make_unique<SlcanHub>(std::move(listener->fd), ListenAddress{at.host, listener->port},
+                                                   std::move(near), std::move(far), path.data()));
 }
 
 }  // namespace narpa

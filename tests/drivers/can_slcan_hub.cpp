@@ -120,12 +120,53 @@ TEST_F(SlcanHub, AListenerHearsAndSendsNothing) {
     EXPECT_EQ(w.hear(*hub_, "z\r"), "\rz\r");
 }
 
-TEST_F(SlcanHub, CanFdIsRefusedAndCounted) {
-    Wire w(port_);
-    w.say("O\rd10F8" + std::string(16, '0') + "\rB0000010FF" + std::string(128, '0') + "\r");
-    EXPECT_EQ(w.hear(*hub_, "\r\a\a"), "\r\a\a");
-    EXPECT_EQ(hub_->counters().not_carried, 2u);
-    EXPECT_EQ(hub_->counters().malformed, 0u);
+TEST_F(SlcanHub, CanFdGoesToClientsThatTakeIt) {
+    Wire sender(port_), told(port_), classic(port_);
+    told.say("Y5\rO\r");
+    EXPECT_EQ(told.hear(*hub_, "\r\r"), "\r\r");
+    classic.say("S6\rO\r");
+    EXPECT_EQ(classic.hear(*hub_, "\r\r"), "\r\r");
+    const std::string eight = "d10F8" + std::string(16, '1') + "\r",
+                      all = "B0000010FF" + std::string(128, 'A') + "\r";
+    sender.say("O\r" + eight + all);
+    EXPECT_EQ(sender.hear(*hub_, "\rz\rZ\r"), "\rz\rZ\r");
+    EXPECT_EQ(told.hear(*hub_, all), eight + all);
+    ASSERT_EQ(sender.frames.size(), 2u);
+    EXPECT_TRUE(sender.frames[0].fd && !sender.frames[0].bit_rate_switch && !sender.frames[0].extended);
+    EXPECT_TRUE(sender.frames[1].fd && sender.frames[1].bit_rate_switch && sender.frames[1].extended);
+    EXPECT_EQ(sender.frames[1].size, 64);
+    // A client that has sent one takes them too. The hub's own are padded to a length that CAN FD has.
+    EXPECT_TRUE(hub_->send(fd_frame(0x123, std::vector<std::uint8_t>(9, 0x22), true)));
+    const std::string nine = "b1239" + std::string(18, '2') + "000000\r";
+    EXPECT_EQ(sender.hear(*hub_, nine), nine);
+    EXPECT_EQ(told.hear(*hub_, nine), nine);
+    EXPECT_TRUE(hub_->send(can_frame(0x124, {0xAA})));
+    EXPECT_EQ(classic.hear(*hub_, "t1241AA\r"), "t1241AA\r") << "and no line of CAN FD before";
+    EXPECT_EQ(hub_->counters().malformed + hub_->counters().not_carried + hub_->counters().send_drops, 0u);
+}
+
+TEST_F(SlcanHub, ListensAtTheAddressThatItIsGiven) {
+    EXPECT_EQ(hub_->description().find("warning"), std::string::npos);
+    const auto elsewhere = open_or_fail("slcan:127.0.0.2:0", CanRole::hub);
+    const std::string bus = elsewhere->address().bus;
+    EXPECT_TRUE(elsewhere->description().starts_with("slcan: 127.0.0.2:")) << elsewhere->description();
+    // Any machine may reach it: said, because slcan has no authentication.
+    const auto open = open_or_fail("slcan:0.0.0.0:0", CanRole::hub);
+    EXPECT_NE(open->description().find("warning: any machine that reaches this address can send commands"),
+              std::string::npos);
+    const std::string port = open->address().bus.substr(6);
+    std::atomic<bool> done{false};
+    std::thread turn([&] {
+        for (ReceivedFrame out; !done;) (void)open->receive(out);
+    });
+    const auto client = open_can_bus("slcan:127.0.0.3:" + port, CanRole::client);
+    done = true;
+    turn.join();
+    ASSERT_TRUE(client) << client.error().what;
+    EXPECT_TRUE((*client)->send(can_frame(0x124, {0xAA})));
+    ReceivedFrame out;
+    EXPECT_TRUE(turn_until(*open, [&] { return open->receive(out); }));
+    EXPECT_EQ(out.frame.id, 0x124u);
 }
 
 TEST_F(SlcanHub, PythonCansOpeningSequence) {

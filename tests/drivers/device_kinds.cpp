@@ -34,6 +34,7 @@ TEST(DeviceKinds, EachTextNamesItsKind) {
         {can_bus_kind, "vcan0", "an interface (can0, vcan0)"},
         {can_bus_kind, "slcan:29537", "slcan:PORT"},
         {can_bus_kind, "slcan", "nothing"},
+        {can_bus_kind, "vcan0+slcan:29537", "BUS+BUS"},
         {can_bus_kind, "memory:loop", "memory:NAME"},
         {can_bus_kind, "", "nothing"},
         {can_bus_kind, "tcp:5000", "nothing"},
@@ -93,7 +94,7 @@ TEST(DeviceKinds, TheManualNamesAll) {
             EXPECT_NE(manual.find(word), std::string::npos) << word << " of " << help;
             at = end + 3;
         }
-    EXPECT_EQ(kinds, 6U + 8U + 5U);
+    EXPECT_EQ(kinds, 7U + 8U + 5U);
 }
 
 }  // namespace

@@ -42,10 +42,25 @@ TEST(CanSlcan, KnownLines) {
     EXPECT_EQ(slcan(remote_frame(0x100, 3, true)), "R000001003\r");
 }
 
-TEST(CanSlcan, CarriesNoFdAndNothingOutOfRange) {
+// The letters and lengths of CANable 2.
+TEST(CanSlcan, KnownLinesOfCanFd) {
+    const std::vector<std::uint8_t> data(12, 0xAB);
+    const std::string digits = "ABABABABABABABABABABABAB\r";
+    EXPECT_EQ(slcan(fd_frame(0x123, data, false)), "d1239" + digits);
+    EXPECT_EQ(slcan(fd_frame(0x123, data, true)), "b1239" + digits);
+    CanFrame f = fd_frame(0x1ABCDEF0, data, false);
+    f.extended = true;
+    EXPECT_EQ(slcan(f), "D1ABCDEF09" + digits);
+    f.bit_rate_switch = true;
+    EXPECT_EQ(slcan(f), "B1ABCDEF09" + digits);
+    EXPECT_EQ(slcan(fd_frame(0x123, std::vector<std::uint8_t>(64, 0), true)).substr(0, 6), "b123F0");
+}
+
+TEST(CanSlcan, CarriesNothingOutOfRange) {
     CanFrame f = can_frame(0x123, {1});
-    f.fd = true;
+    f.fd = f.remote = true;
     EXPECT_EQ(slcan(f), "");
+    EXPECT_EQ(slcan(fd_frame(0x123, std::vector<std::uint8_t>(13, 0), true)), "") << "CAN FD has no 13 bytes";
     EXPECT_EQ(slcan(can_frame(0x800, {1})), "");
     EXPECT_EQ(slcan(can_frame(0x20000000, {1}, true)), "");
     f = can_frame(0x123, {1});
@@ -56,7 +71,9 @@ TEST(CanSlcan, CarriesNoFdAndNothingOutOfRange) {
 TEST(CanSlcan, RoundTrip) {
     std::mt19937_64 rng(11);
     for (int i = 0; i < 20000; ++i) {
-        const CanFrame sent = random_frame(rng, false);
+        CanFrame sent = random_frame(rng, true);
+        if (sent.size > 8) sent.size = std::array<std::uint8_t, 7>{12, 16, 20, 24, 32, 48, 64}[rng() % 7];
+        std::fill(sent.data.begin() + sent.size, sent.data.end(), std::uint8_t{0});
         const std::string line = slcan(sent);
         CanFrame out;
         ASSERT_TRUE(decode_slcan(std::string_view(line).substr(0, line.size() - 1), out)) << line;
@@ -66,10 +83,31 @@ TEST(CanSlcan, RoundTrip) {
 
 TEST(CanSlcan, RejectsBadLines) {
     CanFrame out = can_frame(0x7, {9});
-    for (const char* line :
-         {"",        "t",      "t1",         "t123",     "t1231",    "t12311",  "t1239112233445566778899",
-          "t123F",   "t80000", "T200000000", "T0000000", "tXYZ0",    "t 120",   "t1230 ",
-          "t123011", "r1239",  "x1230",      "t1232112", "R0000000", "t12311G", "T1FFFFFFF"})
+    for (const char* line : {"",
+                             "t",
+                             "t1",
+                             "t123",
+                             "t1231",
+                             "t12311",
+                             "t1239112233445566778899",
+                             "t123F",
+                             "t80000",
+                             "T200000000",
+                             "T0000000",
+                             "tXYZ0",
+                             "t 120",
+                             "t1230 ",
+                             "t123011",
+                             "r1239",
+                             "x1230",
+                             "t1232112",
+                             "R0000000",
+                             "t12311G",
+                             "T1FFFFFFF",
+                             "d123",
+                             "d12390",
+                             "b123900112233445566778899AABBC",
+                             "D1230"})
         EXPECT_FALSE(decode_slcan(line, out)) << line;
     EXPECT_EQ(out.id, 0x7u) << "left as it was";
     EXPECT_TRUE(decode_slcan("t1231AB12EF", out)) << "a LAWICEL time stamp may follow";

@@ -33,3 +33,19 @@ def array(code, width, height, data):
         return unpack(data, PACKED[code]).reshape(height, width)
     channels, kind = FORMATS[code]
     return np.frombuffer(data, kind).reshape((height, width) + ((channels,) if channels > 1 else ()))
+
+
+def test_pattern(pattern, frame, samples, bits):
+    """Samples of a camera's `test_pattern`, "counter" or "prbs": right-justified values of `bits` (protocols/video/README.md)."""
+    if pattern == "counter":
+        return (np.arange(samples) + frame) % (1 << bits)
+    if pattern != "prbs":
+        raise ValueError(f'no test pattern {pattern!r}, expected "counter" or "prbs"')
+    register = (1 << 23) - 1 - frame % (1 << 22)
+    sequence = np.zeros(23 + samples * bits, np.uint8)
+    sequence[:23] = [register >> (22 - i) & 1 for i in range(23)]
+    for start in range(23, sequence.size, 18):  # the next 18 bits depend on earlier ones alone
+        n = min(18, sequence.size - start)
+        sequence[start : start + n] = sequence[start - 23 : start - 23 + n] ^ sequence[start - 18 : start - 18 + n]
+    values = sequence[23:].reshape(samples, bits).astype(np.uint32)
+    return values @ (1 << np.arange(bits - 1, -1, -1, dtype=np.uint32))

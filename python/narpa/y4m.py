@@ -1,6 +1,7 @@
 """YUV4MPEG2 ("Y4M") video, the format of `narpa run --video CAMERA=FILE.y4m` and of its FIFOs.
 
-Frames are NumPy arrays: height x width of uint8 (Cmono) or uint16 (Cmono16). Colour streams are not read as arrays:
+Frames are NumPy arrays: height x width of uint8 (Cmono) or uint16 (Cmono16; Cmono10 and Cmono12, whose values are
+right-justified). Colour streams are not read as arrays:
 `Reader.read_bytes` returns the samples of a frame in stored order (C422: Y, U and V planes of YUYV cameras).
 """
 import os
@@ -9,7 +10,7 @@ import stat
 
 import numpy as np
 
-SAMPLES = {"mono": 1, "mono16": 2, "422": 2, "444": 3, "420": 1.5, "420jpeg": 1.5}  # bytes per pixel
+SAMPLES = {"mono": 1, "mono10": 2, "mono12": 2, "mono16": 2, "422": 2, "444": 3, "420": 1.5, "420jpeg": 1.5}  # bytes per pixel
 
 
 class Reader:
@@ -50,8 +51,8 @@ class Reader:
         data = self.read_bytes()
         if data is None:
             return None
-        if self.colour not in ("mono", "mono16"):
-            raise ValueError(f"the stream has C{self.colour} frames, expected Cmono or Cmono16; read_bytes reads them")
+        if not self.colour.startswith("mono"):
+            raise ValueError(f"the stream has C{self.colour} frames, expected Cmono, Cmono10, Cmono12 or Cmono16; read_bytes reads them")
         return np.frombuffer(data, np.uint8 if self.colour == "mono" else "<u2").reshape(self.height, self.width)
 
     def __iter__(self):

@@ -209,7 +209,7 @@ Result<LatencyRow> measure_packets(std::uint16_t port, const LatencySettings& s,
     const std::string spec = fmt::format("udp:127.0.0.1:{}", port);
     auto source = open_packet_source(fmt::format("udp:{}", port));
     if (!source) return source.error();
-    auto sink = open_packet_sink(spec, {}, 0, false);
+    auto sink = open_packet_sink(spec, {}, false);
     if (!sink) return sink.error();
     std::array<std::uint8_t, kPacketBytes> packet{}, came{};
     LatencyEnds ends;

@@ -9,12 +9,14 @@
 #include <set>
 #include <string>
 
+#include "drivers/can/redundant_bus.h"
 #include "drivers/lidar/packet_sink.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/camera/camera_sensor.h"
 #include "emulator/lidar/lidar_sensor.h"
 #include "emulator/log/run_record.h"
 #include "emulator/threads.h"
+#include "protocols/can/pose_map.h"
 
 namespace narpa {
 namespace {
@@ -70,17 +72,57 @@ Result<std::unique_ptr<Emulator>> Emulator::create(Scene scene, const RunOptions
     if (auto good = check_destinations(options); !good) return good.error();
     auto world = World::create(std::move(scene));
     if (!world) return world.error();
+    if (options.lockstep && (*world)->scene().time.source == TimeSettings::Source::system)
+        return Error{"in lockstep no wall time enters any result: expected source = \"free\" in [time]",
+                     (*world)->scene().file};
+    if (options.lockstep)
+        for (const Body& body : (*world)->scene().bodies)
+            if (body.can_map && !body.can_map->time)
+                return Error{
+                    fmt::format("lockstep needs the time of each command: expected a `time` in can_pose of body "
+                                "\"{}\"",
+                                body.name),
+                    (*world)->scene().file};
     if (options.lockstep && !(*world)->has_commanded_bodies())
         return Error{"--lockstep needs a body with a can_id", (*world)->scene().file};
 
     std::unique_ptr<Emulator> emulator(new Emulator);
     emulator->options_ = options;
     emulator->kinds_ = kinds;
-    emulator->world_ = *std::move(world);
+    emulator->take_world(*std::move(world));
     if (options.duration_s > 0) emulator->end_ns_ = std::llround(options.duration_s * 1e9);
     emulator->threads_ = std::make_unique<TracingThreads>(options.threads, options.cpus);
     if (auto opened = emulator->open(); !opened) return opened.error();
     return emulator;
+}
+
+Result<std::unique_ptr<Emulator>> Emulator::create_next(std::unique_ptr<Emulator> ended,
+                                                        const RunOptions& options) {
+    const Restart restart = *ended->can_->restart();
+    std::unique_ptr<Emulator> emulator(new Emulator);
+    emulator->options_ = options;
+    emulator->kinds_ = ended->kinds_;
+    emulator->end_ns_ = ended->end_ns_;
+    emulator->threads_ = std::move(ended->threads_);
+    emulator->bus_ = std::move(ended->bus_);
+    for (CameraSensor* camera : ended->sensors_.cameras)
+        emulator->sensors_.kept_video[std::string(camera->name())] = camera->take_sinks();
+    for (LidarSensor* lidar : ended->sensors_.lidars)
+        emulator->sensors_.kept_packets[std::string(lidar->name())] = lidar->take_sinks();
+    emulator->take_world(std::move(ended->world_));
+    ended.reset();  // its sensors refer to the world
+    emulator->world_->restart();
+    if (auto opened = emulator->open(); !opened) return opened.error();
+    emulator->can_->begin_with(restart);
+    emulator->lockstep_.moved = true;
+    return emulator;
+}
+
+void Emulator::take_world(std::unique_ptr<World> world) {
+    world_ = std::move(world);
+    if (world_->scene().time.source == TimeSettings::Source::system) system_utc_ = std::make_unique<SystemUtc>();
+    lockstep_.clock.set_epoch(world_->scene().epoch_unix_ns);
+    utc_ = lockstep_.clock.utc();
 }
 
 Status Emulator::open() {
@@ -90,10 +132,13 @@ Status Emulator::open() {
         std::filesystem::create_directories(options_.log_folder, error);
         if (error) return Error{"cannot create folder: " + error.message(), options_.log_folder};
     }
-    if (!options_.bus.empty()) {
+    if (!options_.bus.empty() && !bus_) {
         auto bus = open_can_bus(options_.bus, CanRole::hub);
         if (!bus) return bus.error();
         bus_ = *std::move(bus);
+        const CanSettings& can = world_->scene().can;
+        bus_->set_redundancy(
+            {can.redundancy == CanSettings::Redundancy::cold, can.heartbeat_id, can.heartbeat_timeout_ns});
     }
     for (const SensorKind& kind : kinds_)
         if (auto opened = kind.open(*world_, options_, sensors_); !opened) return opened;
@@ -184,6 +229,19 @@ std::string Emulator::bodies_without_a_pose() const {
     return text;
 }
 
+void Emulator::note_clock() {
+    if (!system_utc_) return;
+    if (!utc_.synchronised)
+        notices_.push_back(
+            "nothing disciplines the system's clock (no ptp4l with phc2sys, chrony or ntpd): the UTC of "
+            "time stamps is as it was set");
+    if (const std::uint32_t steps = system_utc_->steps(); steps > 0)
+        notices_.push_back(
+            fmt::format("the system's clock was stepped during the run, {} times, last by {:+.6f} s; UTC "
+                        "in time stamps followed, exposures did not move",
+                        steps, 1e-9 * static_cast<double>(system_utc_->last_step_ns())));
+}
+
 void Emulator::note_losses() {
     if (!can_) return;
     if (const std::string bodies = bodies_without_a_pose(); !bodies.empty() && !options_.lockstep)
@@ -208,6 +266,7 @@ Status Emulator::run(const StopFlag& stop) {
 Status Emulator::finish() {
     if (no_priority_ || threads_->refused())
         notices_.push_back("no real-time priority (not permitted): wake-ups may be late under load");
+    note_clock();
     note_losses();
     Status status = Ok{};
     const auto keep_first = [&](const Status& done) {

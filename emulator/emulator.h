@@ -13,6 +13,7 @@
 #include "emulator/log/mcap_log.h"
 #include "emulator/realtime.h"
 #include "emulator/sensor_kind.h"
+#include "emulator/system_utc.h"
 
 namespace narpa {
 
@@ -24,6 +25,13 @@ public:
     static Result<std::unique_ptr<Emulator>> create(Scene scene, const RunOptions& options,
                                                     std::span<const SensorKind> kinds = sensor_kinds());
     ~Emulator();
+
+    /// The run that follows one that `restarted`: with its world, bus, sinks and threads, and with logs of its own,
+    /// which `options` name. Sinks count on.
+    static Result<std::unique_ptr<Emulator>> create_next(std::unique_ptr<Emulator> ended,
+                                                         const RunOptions& options);
+    /// The run has ended because the dynamics began again (TimeSettings::on_restart).
+    [[nodiscard]] bool restarted() const noexcept { return can_ && can_->restart(); }
 
     /// Runs until the duration is over, the bus has ended or the flag is set; then flushes everything. Returns the
     /// first error of a file that could not be written.
@@ -46,6 +54,10 @@ public:
     [[nodiscard]] const std::vector<CameraSensor*>& cameras() const noexcept { return sensors_.cameras; }
     [[nodiscard]] const std::vector<LidarSensor*>& lidars() const noexcept { return sensors_.lidars; }
     [[nodiscard]] const std::vector<std::unique_ptr<FrameFeed>>& observers() const noexcept { return observers_; }
+    /// The system's clock, where the run takes UTC from it; else null.
+    [[nodiscard]] const SystemUtc* system_utc() const noexcept { return system_utc_.get(); }
+    /// UTC of simulation time 0 at the end of the run.
+    [[nodiscard]] const RunUtc& utc() const noexcept { return utc_; }
     /// Null without RunOptions::mcap.
     [[nodiscard]] const McapLog* mcap() const noexcept { return mcap_.get(); }
     [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
@@ -74,6 +86,7 @@ private:
     };
 
     Emulator();
+    void take_world(std::unique_ptr<World> world);
     Status open();
     Status open_observers();
     /// Replaces the logs of an earlier run in the folder.
@@ -85,6 +98,9 @@ private:
     void run_sensor(Sensor& sensor, RealTimeRun& run, const StopFlag& stop);
     void run_bus(RealTimeRun& run, const StopFlag& stop);
     void run_observer(FrameFeed& feed, const StopFlag& stop);
+    /// Sends what is due of the clock report and CANopen's SYNC and TIME, and returns when the next is.
+    std::int64_t send_time(const RealTimeClock& clock, std::int64_t now_ns) noexcept;
+    [[nodiscard]] ClockReport clock_report(const RealTimeClock& clock) const noexcept;
 
     /// Send on the CAN bus, if any: what sensors and observers have gathered; the state, with the faults since the
     /// last heartbeat. One thread calls them.
@@ -94,6 +110,7 @@ private:
     /// Why pose commands were refused, as notices.
     [[nodiscard]] std::vector<std::string> notices_of(const PoseRefusals& refusals) const;
     void report_refusals(const PoseRefusals& refusals) const;
+    void note_clock();
     void note_losses();
 
     void run_lockstep(const StopFlag& stop);
@@ -108,6 +125,8 @@ private:
     RunOptions options_;
     std::int64_t end_ns_ = Clock::kNever;  ///< of the simulation clock
     std::unique_ptr<World> world_;
+    std::unique_ptr<SystemUtc> system_utc_;
+    RunUtc utc_{};
     std::unique_ptr<CanBus> bus_;
     std::unique_ptr<RowLog> can_log_;
     std::unique_ptr<CanNode> can_;
@@ -117,6 +136,11 @@ private:
     std::vector<std::unique_ptr<FrameFeed>> observers_;
     Heartbeat faults_{};  ///< since the last heartbeat
     std::uint64_t drops_reported_ = 0;
+    /// When the next of each is due: the clock report, SYNC, TIME.
+    struct {
+        std::int64_t report_ns = 0, sync_ns = 0, time_ns = 0;
+        std::uint32_t steps = 0;  ///< in the last report
+    } next_time_{};
     std::unique_ptr<TracingThreads> threads_;
     LockstepRun lockstep_{};
     std::atomic<std::int64_t> t_ns_{0};

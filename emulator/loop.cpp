@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <barrier>
 #include <cassert>
+#include <limits>
 #include <semaphore>
 #include <thread>
 #include <utility>
@@ -51,8 +52,8 @@ struct StartClock {
 
 /// What the threads of a real-time run share. The clock starts when all of them are at the barrier.
 struct Emulator::RealTimeRun {
-    RealTimeRun(std::size_t threads, std::size_t bodies)
-        : start(static_cast<std::ptrdiff_t>(threads), StartClock{clock}) {
+    RealTimeRun(std::size_t threads, std::size_t bodies, SystemUtc* utc)
+        : clock(utc), start(static_cast<std::ptrdiff_t>(threads), StartClock{clock}) {
         refusals.bodies.reserve(bodies);
     }
     RealTimeClock clock;
@@ -88,7 +89,9 @@ void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
     threads_->make_real_time(kTracingPriority);
-    RealTimeRun run(1 + sensors_.all.size() + (can_ ? 1 : 0), can_ ? can_->commanded_bodies() : 0);
+    RealTimeRun run(1 + sensors_.all.size() + (can_ ? 1 : 0), can_ ? can_->commanded_bodies() : 0,
+                    system_utc_.get());
+    run.clock.set_epoch(world_->scene().epoch_unix_ns);
     run.clock.end_at(end_ns_);
     StopFlag sensors_done{false}, observers_done{false};
     std::thread bus;
@@ -117,6 +120,7 @@ void Emulator::run_real_time(const StopFlag& stop) {
     run.to_report.release();
     notifier.join();
     t_ns_ = std::min(run.clock.now_ns(), run.clock.end_ns());
+    utc_ = run.clock.utc();
 }
 
 void Emulator::become_real_time(const char* name, int priority) {
@@ -144,10 +148,12 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
     become_real_time("narpa-can", kBusPriority);
     RealTimeClock& clock = run.clock;
     run.start.arrive_and_wait();
-    std::int64_t next_heartbeat = 0;
+    std::int64_t next_heartbeat = 0, next_time = 0;
     while (!stop.load(std::memory_order_relaxed)) {
-        can_->wait(clock.now_ns(), kBusWaitNs);
+        const std::int64_t before = clock.now_ns();
+        can_->wait(before, std::clamp<std::int64_t>(next_time - before, 0, kBusWaitNs));
         const std::int64_t now = clock.now_ns();
+        next_time = send_time(clock, now);
         t_ns_.store(now, std::memory_order_relaxed);
         bool moved = false;
         for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
@@ -160,13 +166,49 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
         // A recorded bus has ended: so does the run. Set once, because an overloaded camera never reaches an end
         // that advances with the time.
         if (clock.end_ns() == Clock::kNever && can_->ended()) clock.end_at(now);
+        if (can_->restart() && clock.end_ns() > now) clock.end_at(now);
         if (now >= next_heartbeat) {
             send_heartbeat(now, RunState::running);
             next_heartbeat = next_due_ns(next_heartbeat, kHeartbeatPeriodNs, now);
         }
     }
     send_telemetry(clock.now_ns());
-    send_heartbeat(clock.now_ns(), RunState::stopping);
+    if (!can_->restart()) send_heartbeat(clock.now_ns(), RunState::stopping);
+}
+
+std::int64_t Emulator::send_time(const RealTimeClock& clock, std::int64_t now_ns) noexcept {
+    const CanSettings& settings = world_->scene().can;
+    std::int64_t next_ns = Clock::kNever;
+    const auto due = [&](std::int64_t& at_ns, std::int64_t period_ns) {
+        const bool is_due = now_ns >= at_ns;
+        if (is_due) at_ns = next_due_ns(at_ns, period_ns, now_ns);
+        next_ns = std::min(next_ns, at_ns);
+        return is_due;
+    };
+    // SYNC first: receivers take its arrival for the time.
+    if (settings.sync_period_ns > 0 && due(next_time_.sync_ns, settings.sync_period_ns)) can_->send_sync(now_ns);
+    if (settings.time_period_ns > 0 && due(next_time_.time_ns, settings.time_period_ns))
+        can_->send(canopen_time(settings.time_id, clock.utc().zero_unix_ns + clock.now_ns()), now_ns);
+    if (system_utc_ && now_ns >= 0) {
+        if (const std::uint32_t steps = system_utc_->steps(); steps != std::exchange(next_time_.steps, steps))
+            next_time_.report_ns = now_ns;
+        if (due(next_time_.report_ns, kSecond_ns)) can_->send_numbered(clock_report(clock), now_ns);
+    }
+    return next_ns;
+}
+
+ClockReport Emulator::clock_report(const RealTimeClock& clock) const noexcept {
+    const RunUtc utc = clock.utc();
+    const ClockDiscipline discipline = read_clock_discipline();
+    return {.zero_utc_s = static_cast<std::uint32_t>(utc.zero_unix_ns / kSecond_ns),
+            .zero_utc_fraction_s = 1e-9 * static_cast<double>(utc.zero_unix_ns % kSecond_ns),
+            .state = discipline.synchronised ? UtcState::synchronised : UtcState::not_synchronised,
+            .leap_second_today = discipline.leap_second_today,
+            .steps = static_cast<std::uint8_t>(system_utc_->steps()),
+            .tai_less_utc_s = static_cast<std::int16_t>(discipline.tai_less_utc_s),
+            .error_s = discipline.synchronised ? 1e-9 * static_cast<double>(discipline.error_ns)
+                                               : std::numeric_limits<double>::quiet_NaN(),
+            .frequency_ppm = 1e-3 * static_cast<double>(discipline.frequency_ppb)};
 }
 
 /// Without real-time priority, on one thread: it uses the time that the sensors leave.
@@ -185,6 +227,8 @@ void Emulator::begin() {
 
 void Emulator::run_lockstep(const StopFlag& stop) {
     begin();
+    make_items(Clock::kNever, stop);  // of the command with which a run begins that follows another
+    const bool waits_for_others = world_->scene().time.on_restart == TimeSettings::OnRestart::new_run;
     int waits_alone = 0;
     std::int64_t repeated_ns = monotonic_ns();
     while (!stop.load(std::memory_order_relaxed) && t_ns() < end_ns_) {
@@ -192,9 +236,11 @@ void Emulator::run_lockstep(const StopFlag& stop) {
             can_->repeat_heartbeat();
             repeated_ns = monotonic_ns();
         }
-        if (!take_frame()) {
+        const bool taken = take_frame();
+        if (can_->restart()) return;
+        if (!taken) {
             if (can_->bus().ended()) break;
-            const bool left = can_->hub() && can_->hub()->commanders_left();
+            const bool left = !waits_for_others && can_->hub() && can_->hub()->commanders_left();
             waits_alone = left ? waits_alone + 1 : 0;
             if (waits_alone > kCommanderGraceWaits) {
                 notices_.push_back("the last client that sent commands has left the bus: the run has ended");

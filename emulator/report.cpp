@@ -1,16 +1,35 @@
 // The statistics of a run as JSON and as text.
 #include "emulator/report.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <nlohmann/json.hpp>
+
+#include "drivers/can/redundant_bus.h"
 
 namespace narpa {
 
 using nlohmann::json;
 
 namespace {
+
+/// Of two redundant buses; an empty list for one.
+json buses_document(const CanBus& bus) {
+    json all = json::array();
+    for (const BusUse& use : bus.uses())
+        all.push_back({{"bus", use.bus},
+                       {"frames_received", use.counters.received},
+                       {"frames_used", use.used},
+                       {"duplicates", use.duplicates},
+                       {"while_not_in_use", use.idle},
+                       {"frames_sent", use.counters.sent},
+                       {"send_drops", use.counters.send_drops},
+                       {"interface_down", use.counters.interface_down}});
+    return all;
+}
 
 json bus_document(const CanNode& node) {
     const CommandCounters c = node.counters();
@@ -30,7 +49,18 @@ json bus_document(const CanNode& node) {
             {"frames_not_logged", c.not_logged},
             {"commands_taken", c.taken},
             {"commands_missed", c.missed},
-            {"rejected", to_json(c.rejected())}};
+            {"rejected", to_json(c.rejected())},
+            {"buses", buses_document(node.bus())},
+            {"switches", node.bus().switches()}};
+}
+
+std::string buses_text(const CanBus& bus) {
+    std::string text;
+    for (const BusUse& use : bus.uses())
+        text += fmt::format("    {}: {} frames used, {} as duplicates or not in use, {} sent\n", use.bus, use.used,
+                            use.duplicates + use.idle, use.counters.sent);
+    if (bus.switches() > 0) text += fmt::format("    the other bus was taken into use {} times\n", bus.switches());
+    return text;
 }
 
 std::string bus_text(const CanNode& node) {
@@ -44,13 +74,50 @@ std::string bus_text(const CanNode& node) {
                                  : fmt::format(", {} not (no client, full queue or interface down)", b.send_drops),
                non_zero({{"receive overflow", b.receive_overflow},
                          {"malformed", b.malformed},
-                         {"CAN FD over slcan or CAN XL, which are not carried", b.not_carried},
+                         {"CAN XL, which is not carried", b.not_carried},
                          {"error frames", b.error_frames},
                          {"bus-off", b.bus_off},
                          {"connection or interface lost", b.interface_down}})) +
+           buses_text(node.bus()) +
            (node.hub() && node.hub()->clients_left() > 0
                 ? fmt::format("    clients that have come and gone: {}\n", node.hub()->clients_left())
                 : "");
+}
+
+std::string utc_text(std::int64_t unix_ns) {
+    return fmt::format("{:%Y-%m-%dT%H:%M:%S}Z",
+                       std::chrono::sys_time<std::chrono::nanoseconds>(std::chrono::nanoseconds(unix_ns)));
+}
+
+json clock_document(const Emulator& emulator) {
+    const RunUtc& utc = emulator.utc();
+    json clock{
+        {"source", TimeSettings::kSourceNames[static_cast<std::size_t>(emulator.world().scene().time.source)]},
+        {"utc_of_zero", utc_text(utc.zero_unix_ns)},
+        {"utc_of_zero_unix_ns", utc.zero_unix_ns}};
+    if (const SystemUtc* system = emulator.system_utc()) {
+        const ClockDiscipline d = read_clock_discipline();
+        const auto seconds = [](std::int64_t ns) {
+            return ns < 0 ? json(nullptr) : json(1e-9 * static_cast<double>(ns));
+        };
+        clock["synchronised"] = utc.synchronised;
+        clock["error_s"] = seconds(utc.error_ns);
+        clock["error_max_s"] = seconds(d.error_max_ns);
+        clock["frequency_ppm"] = 1e-3 * static_cast<double>(d.frequency_ppb);
+        clock["tai_less_utc_s"] = d.tai_less_utc_s;
+        clock["steps"] = system->steps();
+        clock["last_step_s"] = 1e-9 * static_cast<double>(system->last_step_ns());
+    }
+    return clock;
+}
+
+std::string clock_text(const Emulator& emulator) {
+    if (!emulator.system_utc()) return {};
+    const RunUtc& utc = emulator.utc();
+    return fmt::format("  clock: the system's UTC, time 0 is {}, {}\n", utc_text(utc.zero_unix_ns),
+                       utc.synchronised
+                           ? fmt::format("estimated error {:g} us", 1e-3 * static_cast<double>(utc.error_ns))
+                           : "not synchronised");
 }
 
 /// Stopping a run that waits for its first command is no failure. A run that was commanded, but not for all of its
@@ -82,6 +149,7 @@ bool made_nothing(const Emulator& emulator) {
 
 json report(const Emulator& emulator) {
     json document{
+        {"clock", clock_document(emulator)},
         {"scene", emulator.world().scene().name},
         {"mode", emulator.options().lockstep ? "lockstep" : "real time"},
         {"simulated_s", static_cast<double>(emulator.t_ns()) * 1e-9},
@@ -129,6 +197,7 @@ std::string to_text(const Emulator& emulator) {
     for (const auto& sensor : emulator.sensors()) out += sensor->to_text(lockstep);
     for (const auto& feed : emulator.observers()) out += feed->observer().to_text(feed->skipped());
     if (emulator.can()) out += bus_text(*emulator.can());
+    out += clock_text(emulator);
     if (!lockstep)
         out += fmt::format("  page faults while running: {} minor, {} major\n", emulator.page_faults().minor,
                            emulator.page_faults().major);

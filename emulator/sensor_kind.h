@@ -2,11 +2,15 @@
 /// has a row here; the loop stays as it is.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "drivers/lidar/packet_sink.h"
+#include "drivers/video/video_sink.h"
 #include "emulator/run_options.h"
 #include "emulator/sensor.h"
 
@@ -20,6 +24,9 @@ struct OpenSensors {
     std::vector<std::unique_ptr<Sensor>> all;  ///< in the order of the table
     std::vector<CameraSensor*> cameras;        ///< frame observers get their frames
     std::vector<LidarSensor*> lidars;
+    /// Sinks by the name of their sensor, from a run that this one follows: they are not opened again.
+    std::map<std::string, std::vector<std::unique_ptr<VideoSink>>, std::less<>> kept_video{};
+    std::map<std::string, std::vector<std::unique_ptr<PacketSink>>, std::less<>> kept_packets{};
 };
 
 struct SensorKind {

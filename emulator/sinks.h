@@ -15,11 +15,13 @@ namespace narpa {
 template <class Sink>
 using Sinks = std::vector<std::unique_ptr<Sink>>;
 
-/// Opens the sinks of sensor `index`, in the order in which they were given.
+/// Opens the sinks of sensor `index`, in the order in which they were given. `kept`: those of an earlier run, by
+/// the name of their sensor, which go on.
 template <class Sink>
 Result<Sinks<Sink>> open_sinks(const std::vector<std::pair<std::string, std::string>>& outputs, std::size_t index,
-                               const auto& sensors, std::string_view kind, const std::string& file,
+                               const auto& sensors, std::string_view kind, const std::string& file, auto& kept,
                                const auto& open) {
+    if (auto found = kept.find(sensors[index].name); found != kept.end()) return std::move(found->second);
     Sinks<Sink> sinks;
     for (const auto& [name, spec] : outputs) {
         auto named = sensor_named(sensors, name, kind, file);

@@ -64,6 +64,11 @@ void World::find_moving() {
     }
 }
 
+void World::restart() noexcept {
+    for (std::size_t i = 0; i < tracks_.size(); ++i)
+        if (tracks_[i]) tracks_[i]->restart(scene_.bodies[i].initial);
+}
+
 void World::set_motion(std::size_t body, const Motion& motion) {
     assert(body < scene_.bodies.size());
     scene_.bodies[body].initial = motion;

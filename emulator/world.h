@@ -43,6 +43,9 @@ public:
 
     // Changes of the scene between frames, while no other thread uses the world.
 
+    /// Forgets all commands.
+    void restart() noexcept;
+
     /// The body's motion from time 0 on, in place of its own, its course and its commands.
     void set_motion(std::size_t body, const Motion& motion);
     /// Where a camera is from now on: on a body, or on the world (-1). For later units; CameraUnit::set_mount.

@@ -67,6 +67,9 @@ struct FrameLedger {
     std::int16_t gain_cdb = 0;
     std::uint8_t binning = 1;
     std::uint16_t region_x = 0, region_y = 0, region_width = 0, region_height = 0;
+    // The clock when the frame was handed over; in the log only.
+    std::int64_t utc_offset_ns = 0;  ///< UTC of simulation time 0, since 1970
+    std::int64_t utc_error_ns = -1;  ///< estimated error of the system's UTC; -1: unknown, or not taken from it
     friend bool operator==(const FrameLedger&, const FrameLedger&) = default;
 };
 

@@ -105,8 +105,7 @@ Result<Finding> test_lidar(const std::string& spec, const Lidar& lidar, bool has
         return Finding{spec, true, "each shot of LiDAR " + lidar.name + " on the CAN bus", ""};
     }
     return test_device(spec, kind, [&] {
-        return open_packet_sink(spec, lidar.model->spec().network, scene.epoch_unix_ns, false,
-                                lidar.model->metadata());
+        return open_packet_sink(spec, lidar.model->spec().network, false, lidar.model->metadata());
     });
 }
 

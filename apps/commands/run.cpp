@@ -6,6 +6,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
+#include <filesystem>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -125,6 +126,37 @@ private:
     std::jthread beats_;
 };
 
+/// Runs to the end and returns the report.
+Result<nlohmann::json> run_once(Emulator& emulator, const RunCommandOptions& options,
+                                const ServiceManager& manager) {
+    const Patience patience(emulator, options.patience_s);
+    const Status ran = [&] {
+        const WatchdogFeed watchdog(emulator, manager);
+        const Progress progress("running", [&] { return step_of(emulator); });
+        return emulator.run(stop_flag());
+    }();
+    if (!ran) return ran.error();
+    if (patience.is_over())
+        return Error{fmt::format("no command advanced the clock for {:g} s, expected one within --patience",
+                                 *options.patience_s),
+                     "", 0, 0, ErrorKind::failed};
+    return report(emulator);
+}
+
+/// "out/run" becomes "out/run-2", "out/run.mcap" "out/run-2.mcap".
+RunOptions numbered_outputs(RunOptions o, int number) {
+    const std::string suffix = fmt::format("-{}", number);
+    if (!o.log_folder.empty()) {
+        const std::filesystem::path folder(o.log_folder);
+        o.log_folder = (folder.has_filename() ? folder : folder.parent_path()).string() + suffix;
+    }
+    if (!o.mcap.empty()) {
+        const std::filesystem::path file(o.mcap);
+        o.mcap = (file.parent_path() / (file.stem().string() + suffix + file.extension().string())).string();
+    }
+    return o;
+}
+
 Outcome run(const RunCommandOptions& options) {
     if (auto good = check_ready_fd(options.ready_fd); !good) return good.error();
     const auto manager = ServiceManager::from_environment();
@@ -175,25 +207,34 @@ Outcome run(const RunCommandOptions& options) {
 
     notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
     manager->notify("READY=1");
-    bool gave_up = false;
-    const Status status = [&] {
-        const Patience patience(**emulator, options.patience_s);
-        const WatchdogFeed watchdog(**emulator, *manager);
-        const Progress progress("running", [&] { return step_of(**emulator); });
-        const Status ran = (*emulator)->run(stop_flag());
-        gave_up = patience.is_over();
-        return ran;
-    }();
-    manager->notify("STOPPING=1");
-    say(to_text(**emulator));
-    if (!status) return status.error();
-    if (gave_up)
-        return Error{fmt::format("no command advanced the clock for {:g} s, expected one within --patience",
-                                 *options.patience_s),
-                     "", 0, 0, ErrorKind::failed};
-    nlohmann::json document = report(**emulator);
-    if (!options.estimates) document["estimate"] = nullptr;
-    return document;
+    nlohmann::json earlier = nlohmann::json::array();
+    for (int number = 1;; ++number) {
+        auto document = run_once(**emulator, options, *manager);
+        const bool again = (*emulator)->restarted() && !stop_flag();
+        if (!again) manager->notify("STOPPING=1");
+        say(to_text(**emulator));
+        if (!document) return document.error();
+        if (!options.estimates) (*document)["estimate"] = nullptr;
+        if (!again) {
+            if ((*emulator)->world().scene().time.on_restart == TimeSettings::OnRestart::new_run) {
+                for (const auto& run : earlier)
+                    if (!run["passed"].get<bool>()) (*document)["passed"] = false;
+                (*document)["earlier_runs"] = earlier;
+            }
+            return *std::move(document);
+        }
+        earlier.push_back(*std::move(document));
+        const RunOptions next = numbered_outputs(o, number + 1);
+        say(fmt::format("the dynamics began again: run {}{}", number + 1,
+                        next.log_folder.empty() ? "" : ", log " + next.log_folder));
+        if (!next.log_folder.empty()) {
+            auto locked = rehearsal::lock_folder(next.log_folder);
+            if (!locked) return locked.error();
+            lock = *std::move(locked);
+        }
+        emulator = Emulator::create_next(*std::move(emulator), next);
+        if (!emulator) return emulator.error();
+    }
 }
 
 }  // namespace

@@ -66,13 +66,13 @@ Status write_text(const std::string& path, const std::string& extension, const F
 
 Status write_capture(const std::string& path, const LidarUnit& of, std::int64_t epoch_unix_ns,
                      const FireAll& fire_all) {
-    auto sink = open_packet_sink(path, of.spec().network, epoch_unix_ns, true, of.lidar().model->metadata());
+    auto sink = open_packet_sink(path, of.spec().network, true, of.lidar().model->metadata());
     if (!sink) return sink.error();
     fire_all([&](std::int64_t packet, LidarUnit& unit) {
-        const std::int64_t t_ns = unit.t_sent_ns(packet);
-        if (!unit.bytes().empty()) (*sink)->send(PacketKind::data, unit.bytes(), t_ns);
+        const std::int64_t unix_ns = epoch_unix_ns + unit.t_sent_ns(packet);
+        if (!unit.bytes().empty()) (*sink)->send(PacketKind::data, unit.bytes(), unix_ns);
         if (const auto position = unit.position(packet); !position.empty())
-            (*sink)->send(PacketKind::position, position, t_ns);
+            (*sink)->send(PacketKind::position, position, unix_ns);
     });
     (*sink)->flush();
     if ((*sink)->counters().dropped > 0)

@@ -14,7 +14,6 @@ using PacketSinkResult = Result<std::unique_ptr<PacketSink>>;
 /// As for open_packet_sink.
 struct PacketSinkOptions {
     const LidarNetwork& network;
-    std::int64_t epoch_unix_ns;
     bool wait_when_full;
     std::string_view metadata;
 };

@@ -55,13 +55,13 @@ std::string packet_sink_help() {
     return help_of(kPacketSinkTable);
 }
 
-PacketSinkResult open_packet_sink(std::string_view spec, const LidarNetwork& network, std::int64_t epoch_unix_ns,
-                                  bool wait_when_full, std::string_view metadata) {
+PacketSinkResult open_packet_sink(std::string_view spec, const LidarNetwork& network, bool wait_when_full,
+                                  std::string_view metadata) {
     const std::string text(spec), name = "packet sink \"" + text + "\": ";
     const PacketSinkKind* kind = find_kind(kPacketSinkTable, text);
     if (kind == nullptr) return Error{name + "expected " + forms_of(kPacketSinkTable)};
     try {
-        return kind->open(kind->rest_of(text), {network, epoch_unix_ns, wait_when_full, metadata});
+        return kind->open(kind->rest_of(text), {network, wait_when_full, metadata});
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
         return Error{name + e.what(), {}, 0, 0, ErrorKind::missing};
     }

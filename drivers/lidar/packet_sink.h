@@ -27,9 +27,9 @@ enum class PacketKind : std::uint8_t { data, position };
 class PacketSink {
 public:
     virtual ~PacketSink() = default;
-    /// Sends one datagram. Never blocks. `t_ns` is the simulation time at which the instrument would send it;
+    /// Sends one datagram. Never blocks. `unix_ns` is the UTC at which the instrument would send it;
     /// a capture stamps the packet with it.
-    virtual bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t t_ns) noexcept = 0;
+    virtual bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t unix_ns) noexcept = 0;
     /// Waits, at most a second, until what was sent is written; then the counters are final. Before,
     /// `receiver_dropped` may be half a second old.
     virtual void flush() noexcept = 0;
@@ -42,14 +42,13 @@ public:
 };
 
 /// SINK: a text of one of the kinds in open_packet_sink.cpp. A capture shows the packets as `network` sends them by
-/// default; `epoch_unix_ns` is the UTC of simulation time 0 for its time stamps. `wait_when_full`: a lockstep run
+/// default. `wait_when_full`: a lockstep run
 /// waits for the disk where a real-time run drops. `metadata`: LidarModel::metadata(); if not empty, it is written
 /// to FILE.json beside a capture. `ouster:` emulates a sensor on the network: an HTTP server at ADDRESS (default
 /// 127.0.0.1) serves the metadata and accepts the packets' destination; until then packets are discarded and not
 /// counted.
 Result<std::unique_ptr<PacketSink>> open_packet_sink(std::string_view spec, const LidarNetwork& network,
-                                                     std::int64_t epoch_unix_ns, bool wait_when_full,
-                                                     std::string_view metadata = {});
+                                                     bool wait_when_full, std::string_view metadata = {});
 /// The kind that a text names; null: none.
 [[nodiscard]] const DeviceKind* packet_sink_kind(const std::string& spec);
 /// All kinds, for --help.

@@ -126,22 +126,20 @@ private:
 
 class PcapSink final : public PacketSink {
 public:
-    PcapSink(const std::string& path, const LidarNetwork& network, std::int64_t epoch_unix_ns, bool wait_when_full,
-             pcap_t* pcap, pcap_dumper_t* dumper)
+    PcapSink(const std::string& path, const LidarNetwork& network, bool wait_when_full, pcap_t* pcap,
+             pcap_dumper_t* dumper)
         : description_("capture " + path),
           network_(network),
-          epoch_unix_ns_(epoch_unix_ns),
           record_(kStampBytes + kHeaderBytes + network.datagram_bytes_max),
           writer_(pcap, dumper),
           queue_(writer_, std::min(kRecordSlotsMost, kQueueBytes / record_.size()), record_.size(),
                  wait_when_full) {}
 
-    bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t t_ns) noexcept override {
+    bool send(PacketKind kind, std::span<const std::uint8_t> payload, std::int64_t unix_ns) noexcept override {
         if (payload.size() > network_.datagram_bytes_max) {
             writer_.abandon(payload);
             return false;
         }
-        const std::int64_t unix_ns = epoch_unix_ns_ + t_ns;
         std::memcpy(record_.data(), &unix_ns, kStampBytes);
         const int port = kind == PacketKind::data ? network_.data_port : network_.position_port;
         const std::size_t size = kStampBytes + put_frame(record_.data() + kStampBytes, network_, port, payload);
@@ -165,7 +163,6 @@ public:
 private:
     std::string description_;
     LidarNetwork network_;
-    std::int64_t epoch_unix_ns_;
     std::vector<std::uint8_t> record_;  ///< the one being made
     PcapWriter writer_;
     WriteQueue queue_;
@@ -185,7 +182,7 @@ PacketSinkResult open_pcap_sink(const std::string& path, const PacketSinkOptions
         ::pcap_close(pcap);
         return error;
     }
-    auto sink = std::make_unique<PcapSink>(path, o.network, o.epoch_unix_ns, o.wait_when_full, pcap, dumper);
+    auto sink = std::make_unique<PcapSink>(path, o.network, o.wait_when_full, pcap, dumper);
     if (!o.metadata.empty())
         if (auto written = write_file(document_beside(path), o.metadata); !written) return written.error();
     return std::unique_ptr<PacketSink>(std::move(sink));

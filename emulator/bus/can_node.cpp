@@ -17,10 +17,14 @@ CanNode::CanNode(World& world, CanBus& bus, RowLog* log, bool lockstep)
       log_(log),
       lockstep_(lockstep),
       pace_(!lockstep && bus.recorded()),
-      ahead_max_ns_(std::llround(world.scene().render.command_ahead_max_s * 1e9)) {
+      ahead_max_ns_(std::llround(world.scene().render.command_ahead_max_s * 1e9)),
+      new_runs_(world.scene().time.on_restart == TimeSettings::OnRestart::new_run) {
     for (std::size_t i = 0; i < world.scene().bodies.size(); ++i)
-        if (PoseTrack* track = world.track(i))
-            listeners_.push_back({track, PoseDecoder(*world.scene().bodies[i].can_id)});
+        if (PoseTrack* track = world.track(i)) {
+            const Body& body = world.scene().bodies[i];
+            Listener& listener = listeners_.emplace_back(track, PoseDecoder(*body.can_id));
+            if (body.can_map) listener.mapped.emplace(body.can_map);
+        }
 }
 
 void CanNode::wait(std::int64_t t_now_ns, std::int64_t timeout_ns) noexcept {
@@ -56,9 +60,14 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
             return status;
     for (Listener& l : listeners_) {
         PoseCommand command;
-        const PoseStatus status = l.decoder.accept(frame, t_now_ns, command);
+        PoseStatus status = l.decoder.accept(frame, t_now_ns, command);
+        if (status == PoseStatus::not_mine && l.mapped) status = l.mapped->accept(frame, t_now_ns, command);
         if (status == PoseStatus::not_mine) continue;
         if (status != PoseStatus::complete) return status;
+        if (new_runs_ && begins_again(*l.track, command)) {
+            if (!restart_) restart_ = {l.decoder.base_id(), command};
+            return status;
+        }
         if (command.t_valid_ns > latest_ns(*l.track, t_now_ns)) {
             ++counters_.too_far_ahead;
             return status;
@@ -78,6 +87,21 @@ PoseStatus CanNode::take(const CanFrame& frame, std::int64_t t_now_ns, bool& mov
     }
     ++counters_.foreign;
     return PoseStatus::not_mine;
+}
+
+bool CanNode::begins_again(const PoseTrack& track, const PoseCommand& command) const noexcept {
+    if (!track.commanded() || command.t_valid_ns >= track.newest_ns()) return false;
+    return command.t_valid_ns <= track.first_ns() || command.t_valid_ns < track.newest_ns() - kRestart_ns;
+}
+
+void CanNode::begin_with(const Restart& restart) noexcept {
+    const auto l =
+        std::ranges::find(listeners_, restart.can_id, [](const Listener& each) { return each.decoder.base_id(); });
+    if (l == listeners_.end() || l->track->push(restart.command, restart.command.t_valid_ns) != TrackStatus::taken)
+        return;
+    l->last_counter = restart.command.counter;
+    ++counters_.taken;
+    if (hub_) hub_->note_commander();
 }
 
 void CanNode::note_refusal(Listener& l, TrackStatus status) noexcept {
@@ -173,6 +197,11 @@ void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
     log_left_out(t_now_ns);
 }
 
+void CanNode::send_sync(std::int64_t t_now_ns) noexcept {
+    put({.id = kSyncId}, t_now_ns);
+    sync(t_now_ns);
+}
+
 void CanNode::repeat_heartbeat() noexcept {
     if (!bus_.recorded() && (!hub_ || hub_->has_clients())) bus_.send(heartbeat_);
 }
@@ -240,7 +269,10 @@ CommandCounters CanNode::counters() const noexcept {
         for (std::size_t s = 0; s < kDecodeStatusCount; ++s)
             c.by_status[s] += decoder.count(static_cast<DecodeStatus>(s));
     };
-    for (const Listener& l : listeners_) add(l.decoder);
+    for (const Listener& l : listeners_) {
+        add(l.decoder);
+        if (l.mapped) add(*l.mapped);
+    }
     add(camera_commands_);
     add(camera_triggers_);
     c.by_status[static_cast<std::size_t>(DecodeStatus::not_mine)] = 0;  // counted once for all in `foreign`

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "emulator/log/row_log.h"
 #include "emulator/world.h"
 #include "protocols/can/messages.h"
+#include "protocols/can/pose_map.h"
 
 namespace narpa {
 
@@ -39,6 +41,12 @@ struct RefusedPoses {
     std::int64_t newest_ns = 0;  ///< time of validity of the newest one that was accepted
 };
 
+/// A pose command that lies before those of its body: the dynamics have begun again.
+struct Restart {
+    std::uint32_t can_id = 0;
+    PoseCommand command{};
+};
+
 /// Why a user should hear of commands that were refused.
 struct PoseRefusals {
     std::uint64_t too_far_ahead = 0;
@@ -56,6 +64,9 @@ public:
     /// This many refused commands of a body in a row are not repeats by the bus: the sender's clock or rate is
     /// wrong.
     static constexpr std::uint32_t kManyRefused = 10;
+    /// A command that lies further back than this, or not after its body's first one, is of dynamics that have
+    /// begun again; others are late, repeated or out of order.
+    static constexpr std::int64_t kRestart_ns = 1'000'000'000;
 
     /// `log` may be null. All outlive the node. In real time frames of a recorded bus wait for their time; in
     /// lockstep they are received at once.
@@ -84,6 +95,9 @@ public:
         send(message, t_now_ns);
     }
     void send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept;
+    void send(const CanFrame& frame, std::int64_t t_now_ns) noexcept { put(frame, t_now_ns); }
+    /// SYNC of CiA 301, which this run's own cameras obey too.
+    void send_sync(std::int64_t t_now_ns) noexcept;
     /// Sends the last heartbeat again, for clients that have joined since; not where the bus knows that there are
     /// none. It is not logged: a log in lockstep does not depend on wall time.
     void repeat_heartbeat() noexcept;
@@ -102,6 +116,11 @@ public:
     /// The refusals so far. Allocates nothing if `out` has room for the commanded bodies.
     void refusals(PoseRefusals& out) const;
     [[nodiscard]] std::size_t commanded_bodies() const noexcept { return listeners_.size(); }
+    /// The command with which the dynamics have begun again, where the scene answers that by a new run; it was not
+    /// accepted.
+    [[nodiscard]] const std::optional<Restart>& restart() const noexcept { return restart_; }
+    /// The first command of the run that follows. Call before the run.
+    void begin_with(const Restart& restart) noexcept;
     /// True if they call for a notice to the user.
     [[nodiscard]] bool refuses_poses() const noexcept { return many_refused_ || counters_.too_far_ahead > 0; }
 
@@ -109,6 +128,7 @@ private:
     struct Listener {
         PoseTrack* track;
         PoseDecoder decoder;
+        std::optional<MappedPoseDecoder> mapped{};  ///< of messages of the user's own
         int last_counter = -1;
         RefusedPoses refused{};
         std::uint32_t refused_in_a_row = 0;
@@ -116,6 +136,7 @@ private:
     };
     bool next_frame(std::int64_t t_now_ns) noexcept;
     void note_refusal(Listener& listener, TrackStatus status) noexcept;
+    [[nodiscard]] bool begins_again(const PoseTrack& track, const PoseCommand& command) const noexcept;
     PoseStatus take(const CanFrame& frame, std::int64_t t_now_ns, bool& moved) noexcept;
     DecodeStatus take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept;
     void trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept;
@@ -143,7 +164,9 @@ private:
     MessageDecoder<CameraCommand> camera_commands_;
     MessageDecoder<CameraTrigger> camera_triggers_;
     CommandCounters counters_{};
-    bool many_refused_ = false;                             ///< of any body
+    bool many_refused_ = false;  ///< of any body
+    bool new_runs_;              ///< TimeSettings::on_restart
+    std::optional<Restart> restart_{};
     std::array<std::uint8_t, 0x800 / kBaseIdStep> sent_{};  ///< the next counter of each base identifier
     CanFrame heartbeat_{};                                  ///< the last
     std::int64_t log_second_ = 0;                           ///< in which logged_others_ were logged

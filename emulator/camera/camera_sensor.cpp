@@ -35,10 +35,11 @@ Status open_cameras(const World& world, const RunOptions& o, OpenSensors& out) {
     if (!o.video.empty() && scene.cameras.empty()) return Error{"the scene has no camera", scene.file};
     for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
         const Camera& c = scene.cameras[i];
-        auto sinks = open_sinks<VideoSink>(o.video, i, scene.cameras, "camera", scene.file, [&](const auto& spec) {
-            return open_video_sink(spec, c.video_format(), o.lockstep ? WhenFull::wait : WhenFull::drop,
-                                   controls_of(c, !o.bus.empty()));
-        });
+        auto sinks = open_sinks<VideoSink>(
+            o.video, i, scene.cameras, "camera", scene.file, out.kept_video, [&](const auto& spec) {
+                return open_video_sink(spec, c.video_format(), o.lockstep ? WhenFull::wait : WhenFull::drop,
+                                       controls_of(c, !o.bus.empty()));
+            });
         if (!sinks) return sinks.error();
         if (sinks->empty()) continue;
         auto camera = std::make_unique<CameraSensor>(world, i, *std::move(sinks), o.late_max);
@@ -121,6 +122,8 @@ void CameraSensor::make_next(const Clock& clock) {
     ledger.t_render_start_ns = started;
     ledger.t_render_end_ns = clock.now_ns();
     ledger.t_deadline_ns = deadline;
+    const RunUtc utc = clock.utc();
+    ledger.utc_offset_ns = utc.zero_unix_ns, ledger.utc_error_ns = utc.error_ns;
     stats_.render.add(monotonic_ns() - wall_start);
     stats_.wake_late.add(started - due_ns());
     stats_.radiance.add(unit_.durations().radiance_ns);

@@ -95,6 +95,8 @@ public:
     [[nodiscard]] const CameraControl* control() const noexcept { return control_ ? &*control_ : nullptr; }
     [[nodiscard]] const CameraStats& stats() const noexcept { return stats_; }
     [[nodiscard]] const std::vector<std::unique_ptr<VideoSink>>& sinks() const noexcept { return sinks_; }
+    /// For the run that follows; this one has ended.
+    [[nodiscard]] std::vector<std::unique_ptr<VideoSink>> take_sinks() noexcept { return std::move(sinks_); }
     SpscRing<FrameLedger, 64>& ledgers() noexcept { return ledgers_; }
 
 private:

@@ -4,6 +4,7 @@
 
 #include "emulator/clock.h"
 #include "protocols/video/embedded_line.h"
+#include "protocols/video/test_pattern.h"
 #include "renderer/camera/read_out.h"
 #include "renderer/detector/detector.h"
 
@@ -113,7 +114,6 @@ void CameraUnit::warm_up() {
 
 FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const FrameBudget& budget, Aovs* aovs,
                                std::atomic<std::size_t>* pixels_done) {
-    const RenderSettings& render = world_.scene().render;
     const PlacementSource source = world_.place(t_mid_ns, camera_.mount, placement_, motions_);
     const std::int64_t start_ns = t_mid_ns - exposure_ns() / 2, end_ns = start_ns + exposure_ns();
     if (camera_.shutter) {
@@ -123,6 +123,41 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
             placement_.set(i, starts_[i].T_world_body, ends_[i].T_world_body);
         world_.tracer().arrange(placement_);
     }
+    const FrameAccount account = camera_.test_pattern == TestPattern::none
+                                     ? take_image(frame, start_ns, end_ns, budget, aovs, pixels_done)
+                                     : put_test_pattern(frame);
+
+    FrameLedger ledger;
+    ledger.frame = frame;
+    ledger.camera = index_;
+    ledger.pose_counter = source.counter;
+    ledger.pose_stale = source.stale;
+    ledger.t_pose_ns = source.t_pose_ns;
+    put_cost(account, ledger);
+    ledger.command_counter = command_counter_;
+    ledger.trigger = settings_.trigger;
+    ledger.gain_cdb = settings_.gain_cdb;
+    ledger.binning = settings_.binning;
+    ledger.region_x = settings_.region.x, ledger.region_y = settings_.region.y;
+    ledger.region_width = settings_.region.width, ledger.region_height = settings_.region.height;
+    ledger.t_exposure_mid_ns = t_mid_ns;
+    ledger.t_exposure_start_ns = start_ns;
+    ledger.t_exposure_end_ns = end_ns;
+    return ledger;
+}
+
+FrameAccount CameraUnit::put_test_pattern(std::uint32_t frame) noexcept {
+    t_radiance_ns_ = monotonic_ns();
+    const int bits = camera_.detector ? camera_.detector->bits : 16;
+    const auto fill = camera_.test_pattern == TestPattern::counter ? fill_counter : fill_prbs;
+    fill(camera_.format, bits, frame, bytes_);
+    durations_ = {.radiance_ns = 0, .sensor_ns = monotonic_ns() - t_radiance_ns_};
+    return {};
+}
+
+FrameAccount CameraUnit::take_image(std::uint32_t frame, std::int64_t start_ns, std::int64_t end_ns,
+                                    const FrameBudget& budget, Aovs* aovs, std::atomic<std::size_t>* pixels_done) {
+    const RenderSettings& render = world_.scene().render;
     const CameraPose pose = camera_pose(world_, camera_, placement_, start_ns, end_ns, motions_);
     const std::int64_t begun_ns = monotonic_ns();
     FrameSettings settings;
@@ -147,24 +182,7 @@ FrameLedger CameraUnit::expose(std::uint32_t frame, std::int64_t t_mid_ns, const
     narpa::expose(camera_, radiance_, settings.seed, frame, bytes_, sensor_array_.get());
     if (camera_.control) read_out(format(), settings_.region, settings_.binning, bytes_);
     durations_.sensor_ns = monotonic_ns() - lit_ns;
-
-    FrameLedger ledger;
-    ledger.frame = frame;
-    ledger.camera = index_;
-    ledger.pose_counter = source.counter;
-    ledger.pose_stale = source.stale;
-    ledger.t_pose_ns = source.t_pose_ns;
-    put_cost(account, ledger);
-    ledger.command_counter = command_counter_;
-    ledger.trigger = settings_.trigger;
-    ledger.gain_cdb = settings_.gain_cdb;
-    ledger.binning = settings_.binning;
-    ledger.region_x = settings_.region.x, ledger.region_y = settings_.region.y;
-    ledger.region_width = settings_.region.width, ledger.region_height = settings_.region.height;
-    ledger.t_exposure_mid_ns = t_mid_ns;
-    ledger.t_exposure_start_ns = start_ns;
-    ledger.t_exposure_end_ns = end_ns;
-    return ledger;
+    return account;
 }
 
 void CameraUnit::put_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept {

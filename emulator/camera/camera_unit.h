@@ -96,6 +96,10 @@ private:
     [[nodiscard]] FrameBudget budget(std::int64_t deadline_ns) const noexcept;
     FrameLedger expose(std::uint32_t frame, std::int64_t t_mid_ns, const FrameBudget& budget, Aovs* aovs,
                        std::atomic<std::size_t>* pixels_done);
+    /// The rendered frame, or a test pattern in its place, in bytes_.
+    FrameAccount take_image(std::uint32_t frame, std::int64_t start_ns, std::int64_t end_ns,
+                            const FrameBudget& budget, Aovs* aovs, std::atomic<std::size_t>* pixels_done);
+    FrameAccount put_test_pattern(std::uint32_t frame) noexcept;
     void put_cost(const FrameAccount& account, FrameLedger& ledger) const noexcept;
 
     const World& world_;

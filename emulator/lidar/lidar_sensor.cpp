@@ -23,10 +23,10 @@ Status open_lidars(const World& world, const RunOptions& o, OpenSensors& out) {
         const bool beams = std::erase_if(packets, to_can) > 0;
         if (beams)
             if (auto good = check_beams_on_can(lidar, !o.bus.empty(), scene.file); !good) return good;
-        auto sinks = open_sinks<PacketSink>(packets, i, scene.lidars, "LiDAR", scene.file, [&](const auto& spec) {
-            return open_packet_sink(spec, lidar.model->spec().network, scene.epoch_unix_ns, o.lockstep,
-                                    lidar.model->metadata());
-        });
+        auto sinks = open_sinks<PacketSink>(
+            packets, i, scene.lidars, "LiDAR", scene.file, out.kept_packets, [&](const auto& spec) {
+                return open_packet_sink(spec, lidar.model->spec().network, o.lockstep, lidar.model->metadata());
+            });
         if (!sinks) return sinks.error();
         if (sinks->empty() && !beams) continue;
         auto sensor = std::make_unique<LidarSensor>(world, i, *std::move(sinks), o.log_shots, o.on_packet);
@@ -65,13 +65,16 @@ void LidarSensor::make_next(const Clock& clock) {
     const std::int64_t due = due_ns();
     stats_.wake_late.add(clock.now_ns() - due);
     const std::int64_t wall_start = monotonic_ns();
-    unit_.fire(next_);
+    const RunUtc utc = clock.utc();
+    const LidarUtc epoch{utc.zero_unix_ns, utc.synchronised};
+    unit_.fire(next_, epoch);
     stats_.fire.add(monotonic_ns() - wall_start);
 
-    const std::span<const std::uint8_t> position = unit_.position(next_);
+    const std::span<const std::uint8_t> position = unit_.position(next_, epoch);
+    const std::int64_t unix_ns = epoch.unix_ns + due;
     for (const auto& sink : sinks_) {
-        if (!unit_.bytes().empty()) sink->send(PacketKind::data, unit_.bytes(), due);
-        if (!position.empty()) sink->send(PacketKind::position, position, due);
+        if (!unit_.bytes().empty()) sink->send(PacketKind::data, unit_.bytes(), unix_ns);
+        if (!position.empty()) sink->send(PacketKind::position, position, unix_ns);
     }
 
     const std::int64_t now = clock.now_ns();
@@ -83,7 +86,7 @@ void LidarSensor::make_next(const Clock& clock) {
     stats_.late += late ? 1 : 0;
     if (keeps_beams_) report_beams();
     if (on_packet_) on_packet_(unit_, next_);
-    if (log_) log_->add(unit_, next_, due, now, late, lost());
+    if (log_) log_->add(unit_, next_, due, now, utc, late, lost());
     if (mcap_) mcap_->packet(world_, lidar_, unit_, next_, now);
     ++next_;
     if (due_ns() + kMaxLagNs < now) {  // skip what is long overdue rather than send it in a burst

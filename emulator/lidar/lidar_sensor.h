@@ -68,6 +68,8 @@ public:
                unit_.spec().rate_hz;
     }
     [[nodiscard]] const std::vector<std::unique_ptr<PacketSink>>& sinks() const noexcept { return sinks_; }
+    /// For the run that follows; this one has ended.
+    [[nodiscard]] std::vector<std::unique_ptr<PacketSink>> take_sinks() noexcept { return std::move(sinks_); }
 
     static constexpr std::int64_t kMaxLagNs = 100'000'000;
 

@@ -61,7 +61,7 @@ LidarUnit::LidarUnit(const World& world, std::size_t index, bool truth)
     if (fired_within(kSpan_ns, shots_) == shots_.size()) by_laser_ = order_by_laser(shots_);
 }
 
-void LidarUnit::fire(std::int64_t packet) noexcept {
+void LidarUnit::fire(std::int64_t packet, LidarUtc epoch) noexcept {
     model_.shots(packet, shots_);
     const std::int64_t start_ns = packet_start_ns(packet);
     fires_ = std::ranges::any_of(shots_, &LidarShot::fires);
@@ -71,7 +71,7 @@ void LidarUnit::fire(std::int64_t packet) noexcept {
     returns_ = 0;
     for (const LidarEchoes& e : echoes_)
         for (const LidarEcho& reported : e.reported(spec().returns)) returns_ += reported.range_m > 0 ? 1 : 0;
-    model_.encode(packet, world_.scene().epoch_unix_ns, echoes_, bytes_);
+    model_.encode(packet, epoch, echoes_, bytes_);
 }
 
 template <class Work>
@@ -143,9 +143,9 @@ void LidarUnit::trace_truth(std::int64_t start_ns) noexcept {
     });
 }
 
-std::span<const std::uint8_t> LidarUnit::position(std::int64_t packet) noexcept {
+std::span<const std::uint8_t> LidarUnit::position(std::int64_t packet, LidarUtc epoch) noexcept {
     if (position_.empty() || packet % spec().data_packets_per_position != 0) return {};
-    model_.encode_position(world_.scene().epoch_unix_ns + t_sent_ns(packet), position_);
+    model_.encode_position({epoch.unix_ns + t_sent_ns(packet), epoch.synchronised}, position_);
     return position_;
 }
 

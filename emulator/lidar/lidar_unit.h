@@ -35,8 +35,10 @@ public:
                (spec().packet_complete_ns > 0 ? spec().packet_complete_ns : packet_period_ns());
     }
 
-    /// Fires a packet's shots, every body where it is at each shot's own time.
-    void fire(std::int64_t packet) noexcept;
+    /// Fires a packet's shots, every body where it is at each shot's own time. `epoch`: UTC of simulation time 0.
+    void fire(std::int64_t packet, LidarUtc epoch) noexcept;
+    /// With the scene's epoch.
+    void fire(std::int64_t packet) noexcept { fire(packet, world_.scene().epoch_unix_ns); }
     /// The packet just fired, as it is sent. Empty where all shots fall outside of the unit's window.
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
         return fires_ ? std::span<const std::uint8_t>(bytes_) : std::span<const std::uint8_t>();
@@ -49,7 +51,10 @@ public:
     [[nodiscard]] std::span<const LidarReturn> truth() const noexcept { return truth_; }
 
     /// The position packet that follows this data packet; empty where none does.
-    [[nodiscard]] std::span<const std::uint8_t> position(std::int64_t packet) noexcept;
+    [[nodiscard]] std::span<const std::uint8_t> position(std::int64_t packet, LidarUtc epoch) noexcept;
+    [[nodiscard]] std::span<const std::uint8_t> position(std::int64_t packet) noexcept {
+        return position(packet, world_.scene().epoch_unix_ns);
+    }
 
 private:
     /// Shots of a packet for which bodies are placed together, and when the first and the last is fired.

@@ -46,9 +46,9 @@ Result<std::vector<LoggedSweep>> read_sweep_log(const std::string& path) {
         const auto read = [&](auto&... values) {
             return ((i < cells.size() && read_number(cells[i], values) && ++i > 0) && ...);
         };
-        const bool good =
-            read(s.sweep, s.t_first_shot_ns, s.t_last_shot_ns, s.packets, s.late, s.skipped, s.shots, s.returns,
-                 s.t_complete_ns, s.t_hand_over_ns, s.hand_over_max_ns, s.packets_crc32, s.lost);
+        const bool good = read(s.sweep, s.t_first_shot_ns, s.t_last_shot_ns, s.packets, s.late, s.skipped, s.shots,
+                               s.returns, s.t_complete_ns, s.t_hand_over_ns, s.hand_over_max_ns, s.packets_crc32,
+                               s.utc_offset_ns, s.utc_error_ns, s.lost);
         if (good && i == cells.size()) continue;
         const std::ptrdiff_t column = i < cells.size() ? cells[i].data() - line.data() + 1 : 1;
         return bad(logged.line, column, fmt::format("expected whole numbers: {}", header));
@@ -103,7 +103,7 @@ Result<std::unique_ptr<SweepLog>> SweepLog::create(const std::string& folder, co
 }
 
 void SweepLog::add(const LidarUnit& unit, std::int64_t packet, std::int64_t t_due_ns, std::int64_t t_sent_ns,
-                   bool late, std::uint64_t lost) noexcept {
+                   const RunUtc& utc, bool late, std::uint64_t lost) noexcept {
     const std::int64_t sweep = unit.sweep(packet), start_ns = unit.packet_start_ns(packet);
     if (sweep_.packets > 0 && sweep != sweep_.sweep) write_sweep(lost);
     if (sweep_.packets == 0) {
@@ -118,6 +118,7 @@ void SweepLog::add(const LidarUnit& unit, std::int64_t packet, std::int64_t t_du
     sweep_.t_last_shot_ns = start_ns + unit.shots().back().t_offset_ns;
     sweep_.t_complete_ns = t_due_ns;
     sweep_.t_hand_over_ns = t_sent_ns;
+    sweep_.utc_offset_ns = utc.zero_unix_ns, sweep_.utc_error_ns = utc.error_ns;
     sweep_.hand_over_max_ns = std::max(sweep_.hand_over_max_ns, t_sent_ns - t_due_ns);
     sweep_.packets_crc32 = static_cast<std::uint32_t>(
         ::crc32(sweep_.packets_crc32, unit.bytes().data(), static_cast<uInt>(unit.bytes().size())));
@@ -132,9 +133,10 @@ void SweepLog::write_sweep(std::uint64_t lost) noexcept {
     const SweepLedger& s = sweep_;
     std::array<char, RowLog::kMaxLine> row;
     sweeps_->append(
-        {row.data(), format_row(row, "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", s.sweep, s.t_first_shot_ns,
+        {row.data(), format_row(row, "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", s.sweep, s.t_first_shot_ns,
                                 s.t_last_shot_ns, s.packets, s.late, s.skipped, s.shots, s.returns, s.t_complete_ns,
-                                s.t_hand_over_ns, s.hand_over_max_ns, s.packets_crc32, s.lost)});
+                                s.t_hand_over_ns, s.hand_over_max_ns, s.packets_crc32, s.utc_offset_ns,
+                                s.utc_error_ns, s.lost)});
     sweep_ = {};
 }
 

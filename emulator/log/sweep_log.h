@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "emulator/clock.h"
 #include "emulator/lidar/lidar_unit.h"
 #include "emulator/log/row_log.h"
 
@@ -27,6 +28,7 @@ struct SweepLedger {
     std::int64_t t_complete_ns = 0, t_hand_over_ns = 0;  ///< of the last packet: when it was due; when it was sent
     std::int64_t hand_over_max_ns = 0;                   ///< the longest from due to sent of any packet
     std::uint32_t packets_crc32 = 0;                     ///< of all bytes of the data packets, as of image_crc32()
+    std::int64_t utc_offset_ns = 0, utc_error_ns = -1;   ///< FrameLedger, when the last packet was sent
     std::uint64_t lost = 0;                              ///< datagrams that sinks or local receivers dropped
 };
 
@@ -34,7 +36,7 @@ struct SweepLedger {
 /// function of commands and seed in lockstep.
 inline constexpr std::string_view kSweepHeader =
     "sweep,t_first_shot_ns,t_last_shot_ns,packets,packets_late,packets_skipped,shots,returns,t_complete_ns,"
-    "t_hand_over_ns,hand_over_max_ns,packets_crc32,packets_lost\n";
+    "t_hand_over_ns,hand_over_max_ns,packets_crc32,utc_offset_ns,utc_error_ns,packets_lost\n";
 struct LoggedSweep {
     SweepLedger ledger;
     int line = 0;  ///< of the log
@@ -79,8 +81,8 @@ public:
                                                     bool wait_when_full);
 
     /// The packet that the unit has just fired and that was due and sent at these times. `lost`: datagrams so far.
-    void add(const LidarUnit& unit, std::int64_t packet, std::int64_t t_due_ns, std::int64_t t_sent_ns, bool late,
-             std::uint64_t lost) noexcept;
+    void add(const LidarUnit& unit, std::int64_t packet, std::int64_t t_due_ns, std::int64_t t_sent_ns,
+             const RunUtc& utc, bool late, std::uint64_t lost) noexcept;
     /// This many packets were left out after the last one.
     void skip(std::uint64_t packets) noexcept { sweep_.skipped += packets; }
     /// Writes the last sweep and closes the files; an Error when any row was lost. `lost`: as in add.

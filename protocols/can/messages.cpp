@@ -8,8 +8,8 @@ namespace {
 
 constexpr std::array kMessages{
     &kPoseLayout,          &kLedgerLayout,      &kEstimateLayout,    &kHeartbeatLayout, &kCameraCommandLayout,
-    &kCameraTriggerLayout, &kCameraReplyLayout, &kCameraStateLayout, &kLidarBeamLayout, &kActuatorLayout,
-    &kNavigationLayout,    &kAttitudeLayout,    &kDynamicsLayout,
+    &kCameraTriggerLayout, &kCameraReplyLayout, &kCameraStateLayout, &kLidarBeamLayout, &kClockLayout,
+    &kActuatorLayout,      &kNavigationLayout,  &kAttitudeLayout,    &kDynamicsLayout,
 };
 
 /// Frames of this identifier belong to the message; of those per camera, to any of them.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "protocols/can/messages/camera.h"
+#include "protocols/can/messages/clock.h"
 #include "protocols/can/messages/closed_loop.h"
 #include "protocols/can/messages/estimate.h"
 #include "protocols/can/messages/frame_ledger.h"

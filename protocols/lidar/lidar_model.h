@@ -130,11 +130,21 @@ struct LidarBeam {
 struct LidarSettings {
     double rate_hz = 0;  ///< turns or frames a second, within the make's limits
     LidarReturns returns = LidarReturns::strongest;
-    LidarPps pps = LidarPps::locked;
-    std::vector<LidarBeam> beams{};  ///< of this unit, by laser number; empty: those of the make
-    std::string profile{};           ///< format of the packets, one of the make's; empty: its default
-    int columns = 0;                 ///< a turn, one of the make's; 0: its default
-    std::string calibration{};       ///< text of the unit's file in the maker's own format; empty: as designed
+    LidarPps pps = LidarPps::locked;  ///< where its source is synchronised
+    bool ptp = false;                 ///< takes its time by PTP: metadata say so
+    std::vector<LidarBeam> beams{};   ///< of this unit, by laser number; empty: those of the make
+    std::string profile{};            ///< format of the packets, one of the make's; empty: its default
+    int columns = 0;                  ///< a turn, one of the make's; 0: its default
+    std::string calibration{};        ///< text of the unit's file in the maker's own format; empty: as designed
+};
+
+/// UTC as a unit knows it.
+struct LidarUtc {
+    // NOLINTNEXTLINE(google-explicit-constructor): a number is a UTC whose source is synchronised
+    constexpr LidarUtc(std::int64_t ns_since_1970, bool is_synchronised = true)
+        : unix_ns(ns_since_1970), synchronised(is_synchronised) {}
+    std::int64_t unix_ns;
+    bool synchronised;  ///< else packets say that it is not, as far as the make does
 };
 
 /// Properties of one configured unit.
@@ -183,11 +193,11 @@ public:
     virtual void shots(std::int64_t packet, std::span<LidarShot> out) const noexcept = 0;
 
     /// Writes a data packet of spec().data_packet_bytes. `echoes` has an element per shot. A range above
-    /// range_m_max is no echo. `epoch_unix_ns`: UTC of simulation time 0, ns since 1970.
-    virtual void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
+    /// range_m_max is no echo. `epoch`: UTC of simulation time 0.
+    virtual void encode(std::int64_t packet, LidarUtc epoch, std::span<const LidarEchoes> echoes,
                         std::span<std::uint8_t> out) const noexcept = 0;
     /// Writes the position (status) packet of this instant, of spec().position_packet_bytes.
-    virtual void encode_position(std::int64_t /*unix_ns*/, std::span<std::uint8_t> /*out*/) const noexcept {}
+    virtual void encode_position(LidarUtc /*now*/, std::span<std::uint8_t> /*out*/) const noexcept {}
 
     /// UTC of a data packet's start, ns since 1970. Where the stamp is ambiguous: the time nearest to
     /// `near_unix_ns`. Nothing: these bytes are not a data packet of this unit.

@@ -16,7 +16,8 @@ constexpr std::int64_t kLivoxFrame_ns = 100'000'000;
 constexpr double kLivoxPoints_hz = 1e9 / LivoxPacket::kPoint_ns;
 constexpr double kLivoxStep_m = 1e-3;
 constexpr int kLivoxLines = 4;
-constexpr std::uint8_t kCartesian32 = 1, kPtp = 1;
+constexpr std::uint8_t kCartesian32 = 1;
+constexpr std::uint8_t kNoSource = 0, kPtp = 1;  // of time
 // Offsets of the header's fields.
 struct LivoxAt {
     static constexpr std::size_t kVersion = 0, kLength = 1, kTimeInterval = 3, kDotNum = 5, kUdpCount = 7,
@@ -74,7 +75,7 @@ public:
         }
     }
 
-    void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
+    void encode(std::int64_t packet, LidarUtc epoch, std::span<const LidarEchoes> echoes,
                 std::span<std::uint8_t> out) const noexcept override {
         assert(echoes.size() == LivoxPacket::kPoints && out.size() == LivoxPacket::kBytes);
         std::ranges::fill(out, std::uint8_t{0});
@@ -86,8 +87,8 @@ public:
         put_le(&out[LivoxAt::kUdpCount], static_cast<std::uint16_t>(packet - first));
         out[LivoxAt::kFrameCount] = static_cast<std::uint8_t>(frame);
         out[LivoxAt::kDataType] = kCartesian32;
-        out[LivoxAt::kTimeType] = kPtp;
-        put_le(&out[LivoxAt::kTimestamp], static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet)));
+        out[LivoxAt::kTimeType] = epoch.synchronised ? kPtp : kNoSource;
+        put_le(&out[LivoxAt::kTimestamp], static_cast<std::uint64_t>(epoch.unix_ns + packet_start_ns(packet)));
         for (std::size_t i = 0; i < echoes.size(); ++i) put_point(packet, i, echoes[i].strongest, out);
         put_le(&out[LivoxAt::kCrc], crc32(out.subspan(LivoxAt::kTimestamp)));
     }

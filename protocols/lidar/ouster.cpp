@@ -71,6 +71,7 @@ Result<OusterMetadata> configured_unit(const LidarSettings& settings, int beams)
     auto read = read_unit(settings, beams);
     if (!read) return read;
     OusterMetadata unit = *std::move(read);
+    unit.ptp = settings.ptp;
     const int columns_before = unit.columns;
     if (settings.columns > 0) unit.columns = settings.columns;
     if (unit.columns == 0) unit.columns = 1024;
@@ -130,7 +131,7 @@ public:
         }
     }
 
-    void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
+    void encode(std::int64_t packet, LidarUtc epoch, std::span<const LidarEchoes> echoes,
                 std::span<std::uint8_t> out) const noexcept override {
         std::ranges::fill(out, std::uint8_t{0});
         const auto frame_id = static_cast<std::uint16_t>(packet / packets_a_turn());
@@ -142,7 +143,7 @@ public:
             const int measurement = measurement_of(packet, c);
             const bool valid = fires(measurement);
             format_.put(
-                OusterColumn{.t_ns = static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet) +
+                OusterColumn{.t_ns = static_cast<std::uint64_t>(epoch.unix_ns + packet_start_ns(packet) +
                                                                 column_offset_ns(packet, c)),
                              .measurement_id = static_cast<std::uint16_t>(measurement),
                              .frame_id = frame_id,

@@ -240,7 +240,7 @@ std::string write_ouster_metadata(const OusterMetadata& m) {
                           {"lidar_mode", std::to_string(m.columns) + "x" + std::to_string(m.rate_hz)},
                           {"operating_mode", "NORMAL"},
                           {"signal_multiplier", 1},
-                          {"timestamp_mode", "TIME_FROM_PTP_1588"},
+                          {"timestamp_mode", m.ptp ? "TIME_FROM_PTP_1588" : "TIME_FROM_INTERNAL_OSC"},
                           {"udp_dest", ""},
                           {"udp_port_imu", m.port_imu},
                           {"udp_port_lidar", m.port_lidar},

@@ -31,6 +31,7 @@ struct OusterMetadata {
     int columns = 0;        ///< of a turn; 0: not stated
     int rate_hz = 0;        ///< turns a second; 0: not stated
     std::string profile{};  ///< one of kOusterProfiles; empty: not stated
+    bool ptp = false;       ///< its clock follows a PTP master; else it runs freely
     int columns_per_packet = OusterFormat::kColumns;
     /// First and last that fire, by way of column 0 where the first is above the last; last below 0: all do.
     std::array<int, 2> column_window{0, -1};

@@ -70,7 +70,7 @@ public:
         }
     }
 
-    void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
+    void encode(std::int64_t packet, LidarUtc epoch, std::span<const LidarEchoes> echoes,
                 std::span<std::uint8_t> out) const noexcept override {
         const std::int64_t frame = packet / packets_, place = packet % packets_;
         const std::size_t first = first_shot(place), each = dual_ ? 2 : 1;
@@ -84,7 +84,7 @@ public:
                     .frame = static_cast<std::uint32_t>(frame),
                     .first_shot = static_cast<std::uint32_t>(first),
                     .shots_per_frame = static_cast<std::uint32_t>(pattern_->shots.size()),
-                    .frame_unix_ns = epoch_unix_ns + packet_start_ns(packet - place),
+                    .frame_unix_ns = epoch.unix_ns + packet_start_ns(packet - place),
                     .range_step_um = micro(pattern_->range_resolution_m),
                     .velocity_step_um_s = micro(pattern_->velocity_resolution_m_s)}
             .write(out);

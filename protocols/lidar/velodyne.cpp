@@ -176,7 +176,7 @@ public:
         }
     }
 
-    void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
+    void encode(std::int64_t packet, LidarUtc epoch, std::span<const LidarEchoes> echoes,
                 std::span<std::uint8_t> out) const noexcept override {
         VelodynePacket p;
         for (int b = 0; b < kBlocks; ++b) {
@@ -187,18 +187,20 @@ public:
                 p.blocks[b].returns[k] = to_return(echo_in_block(echoes[firing * kShotsPerBlock + k], b),
                                                    settings_.beams[k % product_.lasers()].range_offset_m);
         }
-        p.past_hour_us = past_hour_us(epoch_unix_ns + packet_start_ns(packet));
+        p.past_hour_us = past_hour_us(epoch.unix_ns + packet_start_ns(packet));
         p.mode = mode();
         p.product = product_.code;
         p.write(out.first<VelodynePacket::kBytes>());
     }
 
-    void encode_position(std::int64_t unix_ns, std::span<std::uint8_t> out) const noexcept override {
+    void encode_position(LidarUtc now, std::span<std::uint8_t> out) const noexcept override {
+        const LidarPps pps =
+            settings_.pps == LidarPps::locked && !now.synchronised ? LidarPps::synchronising : settings_.pps;
         std::ranges::fill(out, std::uint8_t{0});
-        put_le(&out[kPositionTimeOffset], past_hour_us(unix_ns));
-        out[kPpsOffset] = static_cast<std::uint8_t>(settings_.pps);
-        put_sentence(std::chrono::sys_time<std::chrono::nanoseconds>{std::chrono::nanoseconds{unix_ns}},
-                     settings_.pps == LidarPps::locked, &out[kSentenceOffset]);
+        put_le(&out[kPositionTimeOffset], past_hour_us(now.unix_ns));
+        out[kPpsOffset] = static_cast<std::uint8_t>(pps);
+        put_sentence(std::chrono::sys_time<std::chrono::nanoseconds>{std::chrono::nanoseconds{now.unix_ns}},
+                     pps == LidarPps::locked, &out[kSentenceOffset]);
     }
 
     std::optional<std::int64_t> packet_time(std::span<const std::uint8_t> bytes,

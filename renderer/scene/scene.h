@@ -26,6 +26,7 @@ namespace narpa {
 class LidarModel;
 class Sky;
 struct ShapeKind;
+struct PoseMap;  // protocols/can/pose_map.h
 
 /// Triangles in the body's own frame, metres. Degenerate and non-finite ones were dropped when it was read.
 struct Mesh {
@@ -49,11 +50,12 @@ struct ExactShape {
 
 struct Body {
     std::string name;
-    std::variant<int, ExactShape> shape;     ///< index into Scene::meshes, or an exact shape
-    std::optional<int> mesh_material{};      ///< of all faces of its mesh, in place of the mesh's own; index
-    Motion initial{};                        ///< at time 0
-    std::shared_ptr<const Course> course{};  ///< null: constant velocity and rate from `initial`
-    std::optional<std::uint32_t> can_id{};   ///< base identifier of its pose commands on CAN
+    std::variant<int, ExactShape> shape;       ///< index into Scene::meshes, or an exact shape
+    std::optional<int> mesh_material{};        ///< of all faces of its mesh, in place of the mesh's own; index
+    Motion initial{};                          ///< at time 0
+    std::shared_ptr<const Course> course{};    ///< null: constant velocity and rate from `initial`
+    std::optional<std::uint32_t> can_id{};     ///< base identifier of its pose commands on CAN
+    std::shared_ptr<const PoseMap> can_map{};  ///< its pose from other messages too; null: none
     std::vector<Mark> marks{};
 };
 
@@ -188,7 +190,7 @@ struct CanSettings {
     };
     static constexpr std::array<std::string_view, 2> kRedundancyNames{"hot", "cold"};
     Redundancy redundancy = Redundancy::hot;
-    std::uint32_t heartbeat_id = 0;             ///< of the master that selects the bus; 0: any frame counts
+    std::uint32_t heartbeat_id = 0;                   ///< of the master that selects the bus; 0: any frame counts
     std::int64_t heartbeat_timeout_ns = 500'000'000;  ///< after which the other bus is used
 };
 

@@ -12,6 +12,7 @@ namespace {
 
 /// CAN identifiers: each body has sixteen, from a base that is a multiple of 16.
 constexpr std::int64_t kIdsPerBody = 16, kLastBaseId = 0x5f0;
+constexpr std::uint32_t kSyncIdentifier = 0x080;  // CiA 301
 
 constexpr TableKey kBodyRows[]{
     kNameRow,
@@ -27,6 +28,7 @@ constexpr TableKey kBodyRows[]{
     {"rotation", rows::choice<kRotatingBodies>()},
     {"trajectory", rows::file()},
     {"can_id", rows::integer(0, kLastBaseId)},
+    {"can_pose", rows::table(kCanPoseKeys)},
     {"material", rows::table(kMaterialKeys)},
     {"mark", rows::tables(kMarkKeys)},
 };
@@ -81,7 +83,7 @@ void read_shape(TableReader& table, Body& body, SceneReading& reading) {
     }
 }
 
-void read_can_id(TableReader& table, Body& body, const std::vector<Body>& others) {
+void read_can_id(TableReader& table, Body& body, const Scene& scene) {
     const auto id = table.integer("can_id");
     if (!id) return;
     if (*id % kIdsPerBody != 0) {
@@ -92,7 +94,15 @@ void read_can_id(TableReader& table, Body& body, const std::vector<Body>& others
         return;
     }
     body.can_id = static_cast<std::uint32_t>(*id);
-    for (const Body& other : others)
+    const auto refuse_sender_of = [&](const char* key, std::int64_t period_ns, std::uint32_t taken) {
+        if (period_ns > 0 && taken / kIdsPerBody == *body.can_id / kIdsPerBody)
+            table.fail("can_id",
+                       fmt::format("0x{:03x} has the identifier 0x{:03x} of {} in [can], expected another", *id,
+                                   taken, key));
+    };
+    refuse_sender_of("sync_period_s", scene.can.sync_period_ns, kSyncIdentifier);
+    refuse_sender_of("time_period_s", scene.can.time_period_ns, scene.can.time_id);
+    for (const Body& other : scene.bodies)
         if (other.can_id == body.can_id)
             table.fail("can_id",
                        fmt::format("0x{:03x} is taken by body \"{}\", expected one of its own", *id, other.name));
@@ -154,7 +164,8 @@ void read_bodies(TableReader& root, SceneReading& reading) {
         read_motion(table, body.initial);
         read_rotation(table, body.initial, reading);
         read_orbit(table, body);
-        read_can_id(table, body, reading.scene.bodies);
+        read_can_id(table, body, reading.scene);
+        read_can_pose(table, body, reading);
         read_marks(table, body);
         table.finish();
         add_bodies(all, body, meshes, reading);

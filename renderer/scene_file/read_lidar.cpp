@@ -183,7 +183,9 @@ Lidar read_lidar(TableReader& table, TakenNames& names, Scene& scene, const std:
                    "packets and captures are stamped in time since 1970: expected an epoch in [scene] of "
                    "1970 to 2105");
     const LidarMake make = read_make(table, folder);
-    lidar.model = make.configure(read_settings(table, make, folder, scene.warnings));
+    LidarSettings settings = read_settings(table, make, folder, scene.warnings);
+    settings.ptp = scene.time.source == TimeSettings::Source::system;
+    lidar.model = make.configure(settings);
     const double range_m_most = lidar.model->spec().range_m_max;
     lidar.range_max_m = table.number("range_max_m", {.low = 0, .high = range_m_most, .low_open = true})
                             .value_or(make.range_m_default);

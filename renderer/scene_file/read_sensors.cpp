@@ -38,6 +38,7 @@ constexpr TableKey kCameraRows[]{
     {"format", rows::choice<kCameraFormatNames>()},
     {"rate_hz", rows::number({.low = 1e-3, .high = 10000})},
     {"embedded_line", rows::boolean()},
+    {"test_pattern", rows::choice<kTestPatterns>()},
     {"late_policy", rows::choice<kLatePolicyNames>()},
     {"white_radiance", rows::number(kPositive)},
     {"detector", rows::table(kDetectorKeys)},
@@ -158,6 +159,7 @@ Camera read_camera(TableReader& table, TakenNames& names, SceneReading& reading)
     if (const std::string what = unfit_size(camera.format, camera.width, camera.height); !what.empty())
         table.fail("format", what);
     table.read("embedded_line", camera.embedded_line);
+    table.read("test_pattern", camera.test_pattern);
     if (camera.embedded_line && camera.height < 2)
         table.fail("embedded_line", "takes the last row, expected a resolution of at least 2 rows");
     table.read("late_policy", camera.late);

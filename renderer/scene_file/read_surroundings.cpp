@@ -32,6 +32,17 @@ constexpr TableKey kRenderRows[]{
     {"command_ahead_max_s", rows::number({.low = 0.001, .high = 140'000})},
 };
 
+constexpr TableKey kTimeRows[]{
+    {"source", rows::choice<TimeSettings::kSourceNames>()},
+    {"on_restart", rows::choice<TimeSettings::kOnRestartNames>()},
+};
+constexpr Range kCanPeriod{.low = 0.001, .high = 3600};
+constexpr TableKey kCanRows[]{
+    {"sync_period_s", rows::number(kCanPeriod)}, {"time_period_s", rows::number(kCanPeriod)},
+    {"time_id", rows::integer(0, 0x5FF)},        {"redundancy", rows::choice<CanSettings::kRedundancyNames>()},
+    {"heartbeat_id", rows::integer(0, 0x7FF)},   {"heartbeat_timeout_s", rows::number(kCanPeriod)},
+};
+
 double julian_year(std::int64_t unix_ns) {
     constexpr double kJ2000_s = 946'728'000, kYear_s = 365.25 * 86400;  // leap seconds do not matter here
     return 2000 + (1e-9 * static_cast<double>(unix_ns) - kJ2000_s) / kYear_s;
@@ -102,10 +113,39 @@ void read_render(TableReader& root, Scene& scene) {
     table->finish();
 }
 
+void read_time(TableReader& root, Scene& scene) {
+    auto table = root.table("time");
+    if (!table) return;
+    table->read("source", scene.time.source);
+    table->read("on_restart", scene.time.on_restart);
+    table->finish();
+}
+
+void read_can(TableReader& root, Scene& scene) {
+    auto table = root.table("can");
+    if (!table) return;
+    CanSettings& can = scene.can;
+    const auto read_seconds = [&](std::string_view key, std::int64_t& ns) {
+        if (const auto s = table->number(key)) ns = std::llround(*s * 1e9);
+    };
+    read_seconds("sync_period_s", can.sync_period_ns);
+    read_seconds("time_period_s", can.time_period_ns);
+    if (!table->has("time_period_s")) table->refuse("time_id", "belongs to time_period_s");
+    table->read("time_id", can.time_id);
+    table->read("redundancy", can.redundancy);
+    if (can.redundancy == CanSettings::Redundancy::hot)
+        for (const std::string_view key : {"heartbeat_id", "heartbeat_timeout_s"})
+            table->refuse(key, "belongs to redundancy = \"cold\", and this is \"hot\"");
+    table->read("heartbeat_id", can.heartbeat_id);
+    read_seconds("heartbeat_timeout_s", can.heartbeat_timeout_ns);
+    table->finish();
+}
+
 }  // namespace
 
 constinit const TableKeys kSceneKeys{.rows = kSceneRows}, kSunKeys{.rows = kSunRows},
-    kAmbientKeys{.rows = kAmbientRows}, kRenderKeys{.rows = kRenderRows};
+    kAmbientKeys{.rows = kAmbientRows}, kRenderKeys{.rows = kRenderRows}, kTimeKeys{.rows = kTimeRows},
+    kCanKeys{.rows = kCanRows};
 
 void read_surroundings(TableReader& root, SceneReading& reading) {
     const bool has_epoch = reading.has_epoch = read_scene_table(root, reading.scene);
@@ -113,6 +153,8 @@ void read_surroundings(TableReader& root, SceneReading& reading) {
     read_ambient(root, reading.scene);
     read_stars(root, reading, has_epoch ? std::optional(julian_year(reading.scene.epoch_unix_ns)) : std::nullopt);
     read_render(root, reading.scene);
+    read_time(root, reading.scene);
+    read_can(root, reading.scene);
 }
 
 }  // namespace narpa

@@ -16,12 +16,20 @@ namespace narpa {
 namespace {
 
 constexpr TableKey kSceneFileRows[]{
-    {"scene", rows::table(kSceneKeys)},           {"sun", rows::table(kSunKeys)},
-    {"ambient", rows::table(kAmbientKeys)},       {"stars", rows::table(kStarsKeys)},
-    {"render", rows::table(kRenderKeys)},         {"body", rows::tables(kBodyKeys), "at least one [[body]]"},
-    {"observer", rows::table(kObserverKeys)},     {"light", rows::tables(kLightKeys)},
-    {"camera", rows::tables(kCameraKeys)},        {"lidar", rows::tables(kLidarKeys)},
-    {"atmosphere", rows::table(kAtmosphereKeys)}, {"sky", rows::table(kSkyKeys)},
+    {"scene", rows::table(kSceneKeys)},
+    {"sun", rows::table(kSunKeys)},
+    {"ambient", rows::table(kAmbientKeys)},
+    {"stars", rows::table(kStarsKeys)},
+    {"render", rows::table(kRenderKeys)},
+    {"body", rows::tables(kBodyKeys), "at least one [[body]]"},
+    {"observer", rows::table(kObserverKeys)},
+    {"light", rows::tables(kLightKeys)},
+    {"camera", rows::tables(kCameraKeys)},
+    {"lidar", rows::tables(kLidarKeys)},
+    {"atmosphere", rows::table(kAtmosphereKeys)},
+    {"sky", rows::table(kSkyKeys)},
+    {"time", rows::table(kTimeKeys)},
+    {"can", rows::table(kCanKeys)},
 };
 
 void read_root(TableReader& root, SceneReading& reading) {

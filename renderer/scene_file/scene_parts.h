@@ -55,14 +55,15 @@ struct SceneReading {
     std::optional<Observing> observer{};
 };
 
-extern const TableKeys kSceneKeys, kSunKeys, kAmbientKeys, kStarsKeys, kRenderKeys, kBodyKeys, kObserverKeys,
-    kLightKeys, kCameraKeys, kLidarKeys, kAtmosphereKeys;
+extern const TableKeys kSceneKeys, kSunKeys, kAmbientKeys, kStarsKeys, kRenderKeys, kTimeKeys, kCanKeys, kBodyKeys,
+    kObserverKeys, kLightKeys, kCameraKeys, kLidarKeys, kAtmosphereKeys;
 extern const TableKeys kMaterialKeys, kDemKeys;  ///< of `material` and `dem` of a body
 extern const TableKeys kOrbitKeys;               ///< of `orbit` of a body
 extern const TableKeys kMarkKeys;                ///< of `mark` of a body
+extern const TableKeys kCanPoseKeys;             ///< of `can_pose` of a body
 /// Parts of the keys of cameras: those at the observer, size and projection.
 extern const TableKeys kTrackingKeys, kProjectionKeys;
-/// [scene], [sun], [ambient], [render].
+/// [scene], [sun], [ambient], [render], [time], [can].
 void read_surroundings(TableReader& root, SceneReading& reading);
 /// [stars], with its catalogue. `epoch_year`: that of [scene], if it has one.
 void read_stars(TableReader& root, SceneReading& reading, std::optional<double> epoch_year);
@@ -83,6 +84,8 @@ void read_dem(TableReader& body, int material, SceneReading& reading);
 void load_dems(SceneReading& reading);
 /// `orbit` of a body, which gives its position and velocity; attitude and rate come first.
 void read_orbit(TableReader& table, Body& body);
+/// `can_pose` of a body, after its can_id.
+void read_can_pose(TableReader& body_table, Body& body, SceneReading& reading);
 /// `mark` of a body.
 void read_marks(TableReader& body_table, Body& body);
 /// [observer]: puts the bodies and the Sun where they are seen; bodies and surroundings come first.

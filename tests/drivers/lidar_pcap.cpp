@@ -68,12 +68,12 @@ Bytes payload(std::size_t size, std::uint64_t seed) {
 class PcapSink : public testing::Test {
 protected:
     void SetUp() override {
-        const auto probe = open_packet_sink(folder_ / "probe.pcap", vlp16().network, 0, true);
+        const auto probe = open_packet_sink(folder_ / "probe.pcap", vlp16().network, true);
         if (!probe && probe.error().text().find("built without captures") != std::string::npos)
             GTEST_SKIP() << "built without libpcap";
     }
     std::unique_ptr<PacketSink> opened(bool wait) {
-        auto sink = open_packet_sink(path_, vlp16().network, kEpoch, wait);
+        auto sink = open_packet_sink(path_, vlp16().network, wait);
         EXPECT_TRUE(sink) << sink.error().text();
         return sink ? std::move(*sink) : nullptr;
     }
@@ -89,7 +89,8 @@ TEST_F(PcapSink, HoldsThePacketsAsTheInstrumentBroadcastsThem) {
         for (int i = 0; i < count; ++i) {
             const bool data = i % 15 != 14;
             EXPECT_TRUE(sink->send(data ? PacketKind::data : PacketKind::position,
-                                   payload(data ? 1206 : 512, static_cast<std::uint64_t>(i)), i * 1'327'104LL));
+                                   payload(data ? 1206 : 512, static_cast<std::uint64_t>(i)),
+                                   kEpoch + i * 1'327'104LL));
         }
     }
     const std::vector<Record> records = records_of(test::read_bytes(path_));
@@ -170,7 +171,7 @@ TEST_F(PcapSink, RefusesMoreThanAnEthernetFrameHolds) {
 
 TEST_F(PcapSink, ErrorNamesWhyItCannotWrite) {
     const std::string path = folder_ / "no/such/folder.pcap";
-    const auto sink = open_packet_sink(path, vlp16().network, 0, false);
+    const auto sink = open_packet_sink(path, vlp16().network, false);
     ASSERT_FALSE(sink);
     EXPECT_EQ(sink.error().kind, ErrorKind::missing);
     EXPECT_EQ(sink.error().text(), path + ": cannot write the capture: No such file or directory");

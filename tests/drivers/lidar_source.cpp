@@ -41,7 +41,7 @@ Opened open_somewhere(const std::string& address) {
     return {};
 }
 std::unique_ptr<PacketSink> sink_to(int port) {
-    auto sink = open_packet_sink("udp:127.0.0.1:" + std::to_string(port), vlp16().network, 0, false);
+    auto sink = open_packet_sink("udp:127.0.0.1:" + std::to_string(port), vlp16().network, false);
     EXPECT_TRUE(sink) << sink.error().text();
     return std::move(*sink);
 }

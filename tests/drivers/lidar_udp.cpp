@@ -68,7 +68,7 @@ Bytes counted_bytes(std::size_t size, int first) {
 }
 
 std::unique_ptr<PacketSink> opened(const std::string& spec) {
-    auto sink = open_packet_sink(spec, vlp16().network, 0, false);
+    auto sink = open_packet_sink(spec, vlp16().network, false);
     EXPECT_TRUE(sink) << sink.error().text();
     return sink ? std::move(*sink) : nullptr;
 }
@@ -102,7 +102,7 @@ std::string description_where(const std::string& hosts, const std::string& host)
         const bool own = ::unshare(::geteuid() == 0 ? CLONE_NEWNS : CLONE_NEWUSER | CLONE_NEWNS) == 0 &&
                          ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
                          ::mount(table.c_str(), "/etc/hosts", nullptr, MS_BIND, nullptr) == 0;
-        const auto sink = open_packet_sink("udp:" + host + ":2368", vlp16().network, 0, false);
+        const auto sink = open_packet_sink("udp:" + host + ":2368", vlp16().network, false);
         if (own && sink) std::ofstream(said) << (*sink)->description();
         ::_exit(0);
     }
@@ -116,7 +116,7 @@ TEST(UdpSink, ANameWithAddressesOfBothFamiliesIsThatOfIpv4) {
     EXPECT_EQ(description_where(both, "both.test"),
               "UDP to both.test (127.0.0.7), data port 2368, position port 8308");
     EXPECT_EQ(description_where(both, "127.0.0.7"), "UDP to 127.0.0.7, data port 2368, position port 8308");
-    if (!open_packet_sink("udp:[::1]:2368", vlp16().network, 0, false)) return;  // no IPv6 here
+    if (!open_packet_sink("udp:[::1]:2368", vlp16().network, false)) return;  // no IPv6 here
     EXPECT_EQ(description_where("::1 six.test\n", "six.test"),
               "UDP to six.test (::1), data port 2368, position port 8308");
 }
@@ -138,7 +138,7 @@ TEST(UdpSink, CountsWhatAReceiverOnThisMachineLoses) {
     for (const std::string host : {"127.0.0.1", "127.0.0.2", "[::1]"}) {
         SCOPED_TRACE(host);
         const Receiver receiver(port);
-        auto sink = open_packet_sink("udp:" + host + ":" + std::to_string(port), vlp16().network, 0, false);
+        auto sink = open_packet_sink("udp:" + host + ":" + std::to_string(port), vlp16().network, false);
         if (!sink) continue;  // no such address family here
         send(**sink, 754);    // a second's
         const std::uint64_t lost = (*sink)->counters().receiver_dropped;
@@ -187,7 +187,7 @@ TEST(UdpSink, CountsWhatTheFiftiethReceiverLoses) {
 
 TEST(UdpSink, SendingWithoutReceiverIsNoError) {
     for (const std::string host : {"127.0.0.1", "localhost", "[::1]"}) {
-        auto sink = open_packet_sink("udp:" + host + ":24999", vlp16().network, 0, false);
+        auto sink = open_packet_sink("udp:" + host + ":24999", vlp16().network, false);
         if (!sink) continue;  // no such address family here
         const Bytes packet = counted_bytes(1206, 0);
         for (int i = 0; i < 500; ++i) (*sink)->send(PacketKind::data, packet, 0);
@@ -342,7 +342,7 @@ TEST(PacketSink, BadSinksSayWhatIsWrong) {
         {"udp:127.0.0.1:2368,ttl=0", "ttl=0"},
     };
     for (const auto& [spec, says] : cases) {
-        const auto sink = open_packet_sink(spec, vlp16().network, 0, false);
+        const auto sink = open_packet_sink(spec, vlp16().network, false);
         ASSERT_FALSE(sink) << spec;
         EXPECT_EQ(sink.error().kind, ErrorKind::bad_input) << spec;
         EXPECT_NE(sink.error().text().find(says), std::string::npos) << sink.error().text();
@@ -350,7 +350,7 @@ TEST(PacketSink, BadSinksSayWhatIsWrong) {
 }
 
 TEST(PacketSink, AnInterfaceThatIsNotThereIsMissing) {
-    const auto sink = open_packet_sink("udp:239.1.2.3%none7:2368", vlp16().network, 0, false);
+    const auto sink = open_packet_sink("udp:239.1.2.3%none7:2368", vlp16().network, false);
     ASSERT_FALSE(sink);
     EXPECT_EQ(sink.error().kind, ErrorKind::missing);
     EXPECT_NE(sink.error().text().find("no network interface \"none7\""), std::string::npos) << sink.error().text();

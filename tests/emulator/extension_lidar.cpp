@@ -47,9 +47,9 @@ public:
         }
     }
 
-    void encode(std::int64_t packet, std::int64_t epoch_unix_ns, std::span<const LidarEchoes> echoes,
+    void encode(std::int64_t packet, LidarUtc epoch, std::span<const LidarEchoes> echoes,
                 std::span<std::uint8_t> out) const noexcept override {
-        put_le(out.data(), static_cast<std::uint64_t>(epoch_unix_ns + packet_start_ns(packet)));
+        put_le(out.data(), static_cast<std::uint64_t>(epoch.unix_ns + packet_start_ns(packet)));
         for (std::size_t i = 0; i < kShots; ++i) {
             const LidarEcho& echo = echoes[i].strongest;
             put_le(&out[8 + 5 * i], static_cast<std::uint32_t>(std::lround(1e3 * echo.range_m)));

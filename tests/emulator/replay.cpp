@@ -310,7 +310,7 @@ TEST_F(ReplayTest, ErrorsOfALogNamePlaceAndCause) {
     bad_cell("region_x", "70000", "region_x: \"70000\", expected a whole number");
     bad_cell("t_exposure_mid_ns", "100000001", "nav.ledger.csv:3:1: frame 1 at 100000001 ns: ");
     std::ofstream(ledger) << good_ledger << "3,0\n";
-    expect_refused(log, "nav.ledger.csv:5:1: 2 columns, expected 30");
+    expect_refused(log, "nav.ledger.csv:5:1: 2 columns, expected 32");
     std::ofstream(ledger) << "hello\n";
     expect_refused(log, "nav.ledger.csv:1:1: expected the header line");
     std::filesystem::remove(ledger);

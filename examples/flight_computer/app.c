@@ -378,7 +378,7 @@ int app_run(const struct app_options *options) {
             app.frame_seen_ns = monotonic_ns();
         }
         if (is_time_for_cycle()) cycle();
-        if (!in_lockstep() && seconds_since(app.t_heartbeat_ns) > 1) send_heartbeat();
+        if (app.run_state == HEARTBEAT_RUNNING && seconds_since(app.t_heartbeat_ns) > 1) send_heartbeat();
         check_silence(t_begin_ns);
     }
     print_summary();

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zlib
 from pathlib import Path
+from random import Random
 
 import support
 from support import expect
@@ -52,6 +53,30 @@ def messages_are_those_of_the_dbc():
     expect(not wrong, f"{checked} signals are as in the DBC, others: {wrong}")
     whole = sum(len(catalogue.at(n).fd.signals) - 2 for n in ("Attitude", "Dynamics", "Actuator", "Navigation"))
     expect(checked == whole + 3 + 2, "all signals of these sets are there, three of the ledger, two of the heartbeat")
+
+
+def sets_are_those_of_python(fd):
+    """Random sets, encoded by the Python package, are decoded and encoded again to the same bytes; damaged ones are dropped."""
+    from narpa.can import Catalogue
+
+    harness, random, catalogue = folder / "build/messages", Random(5), Catalogue()
+    sources = [Path(__file__).with_name("flight_computer_messages.c"), EXAMPLE / "messages.c", EXAMPLE / "checksums.c"]
+    subprocess.run(["cc", "-std=c11", "-D_DEFAULT_SOURCE", "-Wall", "-Wextra", "-Werror", f"-I{EXAMPLE}", "-o", harness, *sources, "-lm"], check=True)
+    for name in ("Attitude", "Dynamics", "Actuator", "Navigation"):
+        known = catalogue.at(name)
+        signals = {k: s for k, s in known.fd.signals.items() if k not in ("Counter", "Crc")}
+        for counter in range(20):
+            raw = {k: random.randrange(-(2 ** (s.length - 1)) + 1 if s.signed else 0, 2 ** (s.length - s.signed)) for k, s in signals.items()}
+            values = {k: r * signals[k].factor for k, r in raw.items()}
+            frames = known.encode(values, counter, fd)
+            text = [f"{identifier:X} {data.hex().upper()}" for identifier, data in frames]
+            damaged = [line[:-1] + ("0" if line[-1] != "0" else "1") for line in text]
+            arguments = [harness, "fd" if fd else "classic", str(counter)]
+            lines = subprocess.run(arguments, input="\n".join(damaged + text), capture_output=True, text=True, check=True).stdout.splitlines()
+            got = [float(v) for v in lines[0].split()[2:][:len(values)]] if lines else None
+            if lines[1:] != text or got != list(values.values()):
+                expect(False, f"{name}, counter {counter}: {values} gives {got}, {text} gives {lines[1:]}")
+    expect(True, f"sets of 20 random values each, as {'CAN FD' if fd else 'classic'} frames: the same values and bytes as in Python")
 
 
 def rehearse(name, *options):
@@ -162,6 +187,8 @@ def refuses_bad_arguments():
 
 build()
 messages_are_those_of_the_dbc()
+sets_are_those_of_python(fd=False)
+sets_are_those_of_python(fd=True)
 refuses_bad_arguments()
 counts_lost_datagrams()
 docks()

@@ -95,6 +95,8 @@ static void project(const struct filter *f, const struct mat3 *R_LC, struct view
         const struct vec3 lamp = mat_vec(&R_LT, mission.lamp[l].position_m); /* in L, from the target */
         const struct vec3 p = mat_transposed_vec(&R_LK, vec_sub(lamp, camera_L));
         struct view *view = &views[l];
+        memset(view, 0, sizeof *view);
+        memset(&jacobians[l], 0, sizeof jacobians[l]);
         view->is_visible = p.z > 0.05;
         if (!view->is_visible) continue;
         view->x = camera->cx + camera->fx * p.x / p.z, view->y = camera->cy + camera->fy * p.y / p.z;
@@ -112,7 +114,7 @@ static void project(const struct filter *f, const struct mat3 *R_LC, struct view
 }
 
 /* Three standard deviations of the lamps' pixels, at most. */
-static double search_radius_px(const struct filter *f, const struct view views[], const struct jacobian jacobians[]) {
+static double search_radius_px(const struct filter *f, const struct jacobian jacobians[]) {
     double most = 0;
     for (int l = 0; l < mission.lamps; ++l) {
         double variance = 0;
@@ -120,7 +122,7 @@ static double search_radius_px(const struct filter *f, const struct view views[]
             for (int i = 0; i < ERRORS; ++i)
                 for (int j = 0; j < ERRORS; ++j)
                     variance += jacobians[l].by_error[axis][i] * f->P[i][j] * jacobians[l].by_error[axis][j];
-        if (views[l].is_visible) most = fmax(most, variance);
+        most = fmax(most, variance);
     }
     return 3 * sqrt(most) + 1;
 }
@@ -158,8 +160,8 @@ int filter_update(struct filter *f, const uint8_t *image, const struct mat3 *R_L
     for (int pass = 0; pass < PASSES; ++pass) {
         const bool search = pass == 0, any_scale = search && !before.is_locked;
         int found[LAMPS_MAX];
-        used = assign_spots(views, lamps, spots, n, search ? search_radius_px(f, views, jacobians) : 0,
-                            windows_px[pass], any_scale ? wide : &one, any_scale ? SCALES : 1, found);
+        used = assign_spots(views, lamps, spots, n, search ? search_radius_px(f, jacobians) : 0, windows_px[pass],
+                            any_scale ? wide : &one, any_scale ? SCALES : 1, found);
         if (used < (before.is_locked ? 4 : 8)) {
             *f = before;
             return 0;

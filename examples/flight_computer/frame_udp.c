@@ -44,25 +44,25 @@ static int udp_open(const char *text, const struct camera_table *camera) {
         event(EVENT_ERROR, "--video %s: expected udp:PORT with a port from 1 to 65535", text);
         return EXIT_BAD_INPUT;
     }
+    struct ip_mreqn group = {.imr_ifindex = 0};
+    bool is_group = false;
+    if (colon != NULL) {
+        *colon = '\0';
+        address[strcspn(address, "%")] = '\0'; /* %INTERFACE: the sender's */
+        is_group = inet_pton(AF_INET, address, &group.imr_multiaddr) == 1 &&
+                   IN_MULTICAST(ntohl(group.imr_multiaddr.s_addr)); /* else the address of this machine */
+    }
     width = camera->width, height = camera->height;
     fd = socket(AF_INET, SOCK_DGRAM, 0);
     const int on = 1, buffer = BUFFER_BYTES;
-    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on); /* several receivers of a multicast group */
+    if (is_group) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);      /* it may have other receivers here */
     if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &buffer, sizeof buffer) != 0) /* root only */
         setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);           /* at most net.core.rmem_max */
     const struct sockaddr_in at = {
         .sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr.s_addr = htonl(INADDR_ANY)};
-    if (fd < 0 || bind(fd, (const struct sockaddr *)&at, sizeof at) != 0) {
+    if (fd < 0 || bind(fd, (const struct sockaddr *)&at, sizeof at) != 0 ||
+        (is_group && setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group) != 0)) {
         event(EVENT_ERROR, "--video %s: %s", text, strerror(errno));
-        return EXIT_NO_DEVICE;
-    }
-    struct ip_mreqn group = {.imr_ifindex = 0};
-    if (colon == NULL) return 0;
-    *colon = '\0';
-    address[strcspn(address, "%")] = '\0'; /* %INTERFACE: the sender's */
-    if (inet_pton(AF_INET, address, &group.imr_multiaddr) == 1 && IN_MULTICAST(ntohl(group.imr_multiaddr.s_addr)) &&
-        setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group) != 0) {
-        event(EVENT_ERROR, "--video %s: cannot join the group: %s", text, strerror(errno));
         return EXIT_NO_DEVICE;
     }
     return 0;

@@ -179,6 +179,9 @@ def refuses_bad_arguments():
     refuses("expected udp:PORT", "--can", "can0", "--video", "udp:5004x", status=2)
     refuses("No such file.*expected udp:PORT", "--can", "can0", "--video", "/nowhere", status=3)
     refuses("/dev/video99: No such file", "--can", "can0", "--video", "/dev/video99", status=3)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("", 0))
+        refuses("Address already in use", "--can", "can0", "--video", f"udp:{taken.getsockname()[1]}", status=3)
     refuses("not a FIFO", "--can", "can0", "--video", __file__, status=2)
     refuses("no source of the camera", BUS="slcan:1", VIDEO="aft=udp:5004", status=2)
     refuses("expected slcan:HOST:PORT", "--video", f"udp:{support.free_port()}", BUS="udp:239.74.163.2", status=2)

@@ -63,7 +63,7 @@ static struct app {
     double since_fix_s;
     uint64_t cycles, cycles_with_lamps, cycles_without_frame, commands_late;
     double longest_cycle_s;
-    int64_t frame_seen_ns;
+    int64_t frame_seen_ns, frame_missed_ns; /* the last one came; its lack was last reported */
 } app;
 
 static double seconds_since(int64_t t_ns) { return (double)(monotonic_ns() - t_ns) * 1e-9; }
@@ -335,9 +335,9 @@ static void check_silence(int64_t t_begin_ns) {
         const struct status silent = {.silence_s = seconds_since(app.report_arrived_ns)};
         machine_step(&app.machine, &silent);
     }
-    if (seconds_since(app.frame_seen_ns) > kNoFrames_s) {
-        event(EVENT_WARNING, "no frame for %g s", kNoFrames_s);
-        app.frame_seen_ns = monotonic_ns();
+    if (seconds_since(app.frame_seen_ns) > kNoFrames_s && seconds_since(app.frame_missed_ns) > kNoFrames_s) {
+        event(EVENT_WARNING, "no frame for %.0f s", seconds_since(app.frame_seen_ns));
+        app.frame_missed_ns = monotonic_ns();
     }
 }
 

@@ -36,14 +36,15 @@ Error cannot_listen(const std::string& what, const std::string& port, int reason
 
 }  // namespace
 
-Result<UdpListener> listen_udp(std::string_view text, const std::string& what) {
-    auto address = UdpAddress::parse(text);
+Result<UdpListener> listen_udp(std::string_view text, const std::string& what, std::string_view scheme) {
+    auto address = UdpAddress::parse(text, {}, scheme);
     if (!address) return address.error();
     const std::string& port = address->port;
     if (text.find(':') == text.npos) address->host = "0.0.0.0";
     std::uint16_t number = 0;
     if (address->host.empty() || address->ttl >= 0 || !read_number(port, number) || number == 0)
-        return Error{what + ": expected udp:PORT or udp:ADDRESS:PORT with a port from 1 to 65535, as in udp:2368"};
+        return Error{what + ": expected " + address->scheme + ":PORT or " + address->scheme +
+                     ":ADDRESS:PORT with a port from 1 to 65535, as in " + address->scheme + ":2368"};
 
     // A link-local IPv6 address is complete only with its interface.
     const bool ipv6 = address->host.find(':') != std::string::npos;

@@ -14,7 +14,8 @@ struct UdpListener {
     std::string host, port;
 };
 /// `text`: [ADDRESS[%INTERFACE]:]PORT; without an address, any IPv4 one. A multicast group is joined. `what`: start
-/// of the error texts.
-[[nodiscard]] Result<UdpListener> listen_udp(std::string_view text, const std::string& what);
+/// of the error texts; `scheme`: what stands before the text.
+[[nodiscard]] Result<UdpListener> listen_udp(std::string_view text, const std::string& what,
+                                             std::string_view scheme = "udp");
 
 }  // namespace narpa

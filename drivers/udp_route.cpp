@@ -73,7 +73,7 @@ bool has_route(const UdpDestination& to) {
            errno != ENETUNREACH;
 }
 
-/// Reads "NAME=N,NAME=N".
+/// Reads "NAME=N,NAME=FILE".
 Status read_options(std::string_view text, std::span<const UdpOption> options) {
     for (bool more = true; more;) {
         const std::string_view option = text.substr(0, text.find(','));
@@ -81,17 +81,24 @@ Status read_options(std::string_view text, std::span<const UdpOption> options) {
         text = text.substr(std::min(option.size() + 1, text.size()));
         const std::size_t equals = std::min(option.find('='), option.size());
         const auto known = std::ranges::find(options, option.substr(0, equals), &UdpOption::name);
+        const std::string_view given = option.substr(std::min(equals + 1, option.size()));
+        if (known != options.end() && known->file != nullptr && !given.empty()) {
+            *known->file = given;
+            continue;
+        }
         int value = 0;
-        if (known != options.end() && equals < option.size() && read_number(option.substr(equals + 1), value) &&
+        if (known != options.end() && known->file == nullptr && read_number(given, value) &&
             value >= known->least && value <= known->most) {
             *known->value = value;
             continue;
         }
         std::string expected;
         for (const UdpOption& o : options)
-            expected.append(expected.empty() ? "" : " or ")
-                .append("," + std::string(o.name) + "=N, from " + std::to_string(o.least) + " to " +
-                        std::to_string(o.most));
+            expected.append(expected.empty() ? "," : " or ,")
+                .append(o.name)
+                .append(o.file != nullptr
+                            ? "=FILE"
+                            : "=N, from " + std::to_string(o.least) + " to " + std::to_string(o.most));
         return Error{"expected nothing after the port but " + expected};
     }
     return Ok{};
@@ -103,12 +110,15 @@ bool is_limited_broadcast(const UdpDestination& to) {
 
 }  // namespace
 
-Result<UdpAddress> UdpAddress::parse(std::string_view text, std::vector<UdpOption> options) {
+Result<UdpAddress> UdpAddress::parse(std::string_view text, std::vector<UdpOption> options,
+                                     std::string_view scheme) {
     UdpAddress out;
+    out.scheme = scheme;
+    const std::string whole = out.scheme + ":" + std::string(text);
     options.insert(options.begin(), {"ttl", 0, 255, &out.ttl});
     if (const std::size_t comma = text.find(','); comma != text.npos) {
         if (auto read = read_options(text.substr(comma + 1), options); !read)
-            return Error{"udp:" + std::string(text) + ": " + read.error().what};
+            return Error{whole + ": " + read.error().what};
         text = text.substr(0, comma);
     }
     const std::size_t colon = text.rfind(':');
@@ -120,8 +130,7 @@ Result<UdpAddress> UdpAddress::parse(std::string_view text, std::vector<UdpOptio
     out.host = host.substr(0, percent);
     if (percent == host.npos) return out;
     out.interface = host.substr(percent + 1);
-    if (out.interface.empty())
-        return Error{"udp:" + std::string(text) + ": expected an interface after %, as in %eth0"};
+    if (out.interface.empty()) return Error{whole + ": expected an interface after %, as in %eth0"};
     return out;
 }
 
@@ -172,8 +181,8 @@ Status set_route(int fd, UdpDestination& to, const UdpAddress& address, const st
         return Error{what + ": ttl=" + std::to_string(address.ttl) + ": " + std::strerror(errno) +
                      ", expected 1 to 255, or 0 to 255 to a multicast group"};
     if (*index == 0 && (to.is_multicast() || is_limited_broadcast(to)) && !has_route(to))
-        return missing(what + ": this machine has no route there: name the interface to send by, as in udp:" +
-                           address.host + "%eth0:" + address.port,
+        return missing(what + ": this machine has no route there: name the interface to send by, as in " +
+                           address.scheme + ":" + address.host + "%eth0:" + address.port,
                        "ip -br link   (the interfaces of this machine)");
     return Ok{};
 }
@@ -192,9 +201,9 @@ Status join_group(int fd, const UdpDestination& group, const UdpAddress& address
         joined = set(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, membership);
     }
     if (joined) return Ok{};
-    return missing(
-        what + ": cannot join the multicast group " + address.host + ": " + std::strerror(errno),
-        "name the interface, as in udp:" + address.host + "%eth0:" + address.port + "; ip -br link shows them");
+    return missing(what + ": cannot join the multicast group " + address.host + ": " + std::strerror(errno),
+                   "name the interface, as in " + address.scheme + ":" + address.host + "%eth0:" + address.port +
+                       "; ip -br link shows them");
 }
 
 }  // namespace narpa

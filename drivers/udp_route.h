@@ -17,20 +17,23 @@
 
 namespace narpa {
 
-/// An option behind an address: NAME=N.
+/// An option behind an address: NAME=N, or NAME=FILE.
 struct UdpOption {
     std::string_view name;
     int least, most;
-    int* value;  ///< out; unchanged where the option is not given
+    int* value;                   ///< out; unchanged where the option is not given
+    std::string* file = nullptr;  ///< the same, in place of a number: no comma is in it
 };
 
 /// The parts of an address text; they may be empty.
 struct UdpAddress {
     std::string host, interface, port;
-    int ttl = -1;  ///< 0 to 255; -1: the system's, 1 for multicast
+    int ttl = -1;                ///< 0 to 255; -1: the system's, 1 for multicast
+    std::string scheme = "udp";  ///< what stands before the colon, for error texts
 
     /// Errors concern the options, `ttl` and these; host and port are not checked.
-    static Result<UdpAddress> parse(std::string_view text, std::vector<UdpOption> options = {});
+    static Result<UdpAddress> parse(std::string_view text, std::vector<UdpOption> options = {},
+                                    std::string_view scheme = "udp");
 };
 
 /// An address with its family; the port is 0.

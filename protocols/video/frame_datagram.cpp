@@ -1,7 +1,6 @@
 #include "protocols/video/frame_datagram.h"
 
 #include <algorithm>
-#include <cassert>
 #include <string>
 
 #include "protocols/crc32.h"
@@ -34,26 +33,11 @@ std::int32_t newer_by(std::uint32_t number, std::uint32_t than) noexcept {
 
 }  // namespace
 
-FrameCut::FrameCut(const VideoFormat& format, std::size_t datagram_bytes)
-    : row_bytes_(link_row_bytes(format)), rows_(static_cast<std::size_t>(format.height)), part_bytes_(row_bytes_) {
-    assert(datagram_bytes >= kFrameDatagramHeaderBytes + kPartUnit);
-    const std::size_t most = datagram_bytes - kFrameDatagramHeaderBytes;
-    if (row_bytes_ <= most) {
-        rows_each_ = std::min(most / row_bytes_, rows_);
-    } else {
-        const std::size_t units = (row_bytes_ + kPartUnit - 1) / kPartUnit, units_most = most / kPartUnit;
-        parts_of_row_ = (units + units_most - 1) / units_most;
-        part_bytes_ = (units + parts_of_row_ - 1) / parts_of_row_ * kPartUnit;
-        parts_of_row_ = (row_bytes_ + part_bytes_ - 1) / part_bytes_;
-    }
-    parts_ = static_cast<std::uint32_t>((rows_ + rows_each_ - 1) / rows_each_ * parts_of_row_);
-}
-
-FrameCut::Part FrameCut::operator[](std::uint32_t index) const noexcept {
-    const std::size_t row = index / parts_of_row_ * rows_each_, byte = index % parts_of_row_ * part_bytes_;
-    const std::size_t bytes = parts_of_row_ > 1 ? std::min(part_bytes_, row_bytes_ - byte)
-                                                : row_bytes_ * std::min(rows_each_, rows_ - row);
-    return {static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(byte), row * row_bytes_ + byte, bytes};
+FrameCut cut_into_frame_datagrams(const VideoFormat& format, std::size_t datagram_bytes) {
+    return FrameCut({.row_bytes = link_row_bytes(format),
+                     .rows = static_cast<std::size_t>(format.height),
+                     .unit_bytes = kPartUnit},
+                    datagram_bytes - kFrameDatagramHeaderBytes);
 }
 
 std::array<std::uint8_t, kFrameDatagramHeaderBytes> encode_frame_datagram(

@@ -1,4 +1,4 @@
-/// protocols/video/frame_datagram.h - frames in UDP datagrams: how a frame is cut, and the header of each part.
+/// protocols/video/frame_datagram.h - frames in UDP datagrams: the header of each part, and putting them together.
 ///
 /// README.md in this folder has the table. A datagram holds whole rows, or a part of one row, and says where its
 /// bytes belong, so that a receiver needs no state to place them.
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/pixel_format.h"
+#include "protocols/video/frame_cut.h"
 
 namespace narpa {
 
@@ -29,29 +30,9 @@ struct FrameDatagramHeader {
 /// magic, version, length | time | frame, format | width, height, bytes a row | index, count, row, byte | CRC
 inline constexpr std::size_t kFrameDatagramHeaderBytes = 4 + 2 * 2 + 8 + 4 + 4 + 2 * 2 + 4 + 4 * 4 + 4;  ///< 52
 inline constexpr std::uint16_t kFrameDatagramVersion = 1;
-/// Headers of IPv4 and UDP.
-inline constexpr std::size_t kIpUdpBytes = 20 + 8;
 
-/// The frames of a format, cut for datagrams of at most this size.
-class FrameCut {
-public:
-    struct Part {
-        std::uint32_t row, byte_in_row;
-        std::size_t begin, bytes;  ///< in the frame
-    };
-    /// `datagram_bytes`: payload of UDP, header included; above the header's.
-    FrameCut(const VideoFormat& format, std::size_t datagram_bytes);
-
-    [[nodiscard]] std::uint32_t count() const noexcept { return parts_; }
-    [[nodiscard]] Part operator[](std::uint32_t index) const noexcept;
-
-private:
-    std::size_t row_bytes_, rows_;
-    std::size_t rows_each_ = 1;     ///< whole rows in a datagram
-    std::size_t parts_of_row_ = 1;  ///< datagrams of a row
-    std::size_t part_bytes_;        ///< of a part of a row
-    std::uint32_t parts_;
-};
+/// The frames of a format, cut for datagrams of at most `datagram_bytes` of payload, headers included.
+[[nodiscard]] FrameCut cut_into_frame_datagrams(const VideoFormat& format, std::size_t datagram_bytes);
 
 /// The CRC covers the header and `bytes`.
 [[nodiscard]] std::array<std::uint8_t, kFrameDatagramHeaderBytes> encode_frame_datagram(

@@ -1,7 +1,9 @@
-/// tests/drivers/video_support.h - frames that are told apart, and files of them.
+/// tests/drivers/video_support.h - frames that are told apart, files of them, and ports for them.
 #pragma once
 
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include <chrono>
 #include <cstdint>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "base/pixel_format.h"
+#include "drivers/descriptor.h"
 #include "protocols/video/y4m.h"
 
 namespace narpa::test {
@@ -25,6 +28,31 @@ inline Bytes noise_frame(const VideoFormat& format, std::uint64_t seed) {
     for (auto& byte : frame) byte = static_cast<std::uint8_t>(random());
     return frame;
 }
+
+/// A UDP socket at a port that nobody else has.
+class OwnPort {
+public:
+    OwnPort() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+        sockaddr_in at{};
+        at.sin_family = AF_INET;
+        at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        EXPECT_EQ(::bind(fd_.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
+        socklen_t size = sizeof at;
+        ::getsockname(fd_.get(), reinterpret_cast<sockaddr*>(&at), &size);
+        number_ = ntohs(at.sin_port);
+    }
+    [[nodiscard]] std::string text() const { return std::to_string(number_); }
+    [[nodiscard]] int fd() const { return fd_.get(); }
+    /// Leaves it to another socket.
+    std::string release() {
+        fd_.reset();
+        return text();
+    }
+
+private:
+    Descriptor fd_;
+    std::uint16_t number_ = 0;
+};
 
 /// What a command writes to standard output; empty when it cannot run.
 inline Bytes output_of(const std::string& command) {

@@ -1,11 +1,8 @@
 // Frames in datagrams: from the sink udp: to the source udp:, on the loopback.
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 
 #include "base/time.h"
-#include "drivers/descriptor.h"
 #include "drivers/video/video_sink.h"
 #include "drivers/video/video_source.h"
 #include "protocols/video/frame_datagram.h"
@@ -14,35 +11,10 @@
 namespace narpa {
 namespace {
 
-using test::Bytes, test::noise_frame;
+using test::Bytes, test::noise_frame, test::OwnPort;
 
 constexpr VideoFormat kSmallFrames{64, 48, PixelFormat::y16, 100'000'000};
 constexpr std::int64_t kSoon_ns = 60'000'000'000;
-
-/// A socket at a port that nobody else has.
-class OwnPort {
-public:
-    OwnPort() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-        sockaddr_in at{};
-        at.sin_family = AF_INET;
-        at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-        EXPECT_EQ(::bind(fd_.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
-        socklen_t size = sizeof at;
-        ::getsockname(fd_.get(), reinterpret_cast<sockaddr*>(&at), &size);
-        number_ = ntohs(at.sin_port);
-    }
-    [[nodiscard]] std::string text() const { return std::to_string(number_); }
-    [[nodiscard]] int fd() const { return fd_.get(); }
-    /// Leaves it to another socket.
-    std::string release() {
-        fd_.reset();
-        return text();
-    }
-
-private:
-    Descriptor fd_;
-    std::uint16_t number_ = 0;
-};
 
 std::unique_ptr<VideoSink> frames_to(const std::string& port_and_options, const VideoFormat& format) {
     auto sink = open_video_sink("udp:127.0.0.1:" + port_and_options, format, WhenFull::wait);

@@ -23,7 +23,7 @@ std::vector<std::uint8_t> frame_of(const VideoFormat& format, std::uint32_t numb
 
 Datagrams datagrams_of(const VideoFormat& format, std::uint32_t number, std::size_t most) {
     const std::vector<std::uint8_t> frame = frame_of(format, number);
-    const FrameCut cut(format, most);
+    const FrameCut cut = cut_into_frame_datagrams(format, most);
     Datagrams out;
     for (std::uint32_t i = 0; i < cut.count(); ++i) {
         const FrameCut::Part part = cut[i];
@@ -51,7 +51,7 @@ TEST(FrameDatagram, PartsCoverTheFrameOnceForAnyLength) {
     for (const PixelFormat pixel : {PixelFormat::grey, PixelFormat::y16, PixelFormat::rgb24})
         for (const std::size_t most : {76u, 100u, 152u, 352u, 1472u, 4000u, 65507u}) {
             const VideoFormat format{100, 60, pixel, 100'000'000};
-            const FrameCut cut(format, most);
+            const FrameCut cut = cut_into_frame_datagrams(format, most);
             std::size_t next = 0;
             for (std::uint32_t i = 0; i < cut.count(); ++i) {
                 const FrameCut::Part part = cut[i];

@@ -46,9 +46,9 @@ struct LatencyEnds {
 [[nodiscard]] Result<std::vector<LatencyRow>> measure_bus(const std::string& spec, const LatencySettings& settings,
                                                           const StopFlag& stop);
 /// Frames. `spec`: SINK of open_video_sink, which this machine reads: V4L2 devices and FIFOs as they are (a FIFO
-/// that is not there is made), `udp:HOST:PORT` at any of its addresses, a file by looking whether the frame is in
-/// it; `uvc:PORT` and `bulk:` are attached here through vhci_hcd, for which the program is to be root, `bulk:` with
-/// a bridge in software.
+/// that is not there is made), `udp:HOST:PORT` and `rtp:HOST:PORT` at any of its addresses, a file by looking
+/// whether the frame is in it; `uvc:PORT` and `bulk:` are attached here through vhci_hcd, for which the program is
+/// to be root, `bulk:` with a bridge in software.
 [[nodiscard]] Result<LatencyRow> measure_sink(const std::string& spec, const LatencySettings& settings,
                                               const StopFlag& stop);
 /// LiDAR packets of 1206 bytes over UDP to a port of this machine.

@@ -123,7 +123,7 @@ Result<VideoEnds> open_video_ends(const std::string& spec, const VideoFormat& fo
         return Ok{};
     };
     const bool is_bulk = spec.starts_with("bulk:"), is_uvc = spec.starts_with("uvc:"),
-               is_udp = spec.starts_with("udp:");
+               is_udp = spec.starts_with("udp:") || spec.starts_with("rtp:");
     struct stat info {};
     if (!is_bulk && !is_uvc && !is_udp && !spec.ends_with(".y4m") && ::stat(spec.c_str(), &info) != 0 &&
         !spec.starts_with("/dev/") && ::mkfifo(spec.c_str(), 0600) != 0)
@@ -134,7 +134,8 @@ Result<VideoEnds> open_video_ends(const std::string& spec, const VideoFormat& fo
     }
     if (is_udp) {  // before the first datagram
         const std::string address = spec.substr(0, spec.find(','));
-        if (auto good = open_source("udp:" + address.substr(address.rfind(':') + 1)); !good) return good.error();
+        if (auto good = open_source(address.substr(0, 4) + address.substr(address.rfind(':') + 1)); !good)
+            return good.error();
     }
     const std::function open_sink = [&] { return open_video_sink(spec, format, WhenFull::wait); };
     auto sink = is_bulk ? once_it_is_seen<Sink>(open_sink, stop) : open_sink();

@@ -116,8 +116,9 @@ Command add_bench_latency(Parser bench_command) {
         .type_name("BUS")
         .repeatable();
     c.option("--video", o->sinks,
-             "SINK as of `narpa run`, read by the bench itself: /dev/videoN, a FIFO, FILE.y4m, udp:127.0.0.1:PORT; "
-             "uvc:PORT and bulk: are attached to this machine, with a bridge in software (vhci-hcd, root); may be "
+             "SINK as of `narpa run`, read by the bench itself: /dev/videoN, a FIFO, FILE.y4m, udp:127.0.0.1:PORT, "
+             "rtp:127.0.0.1:PORT; uvc:PORT and bulk: are attached to this machine, with a bridge in software "
+             "(vhci-hcd, root); may be "
              "given many "
              "times")
         .type_name("SINK")

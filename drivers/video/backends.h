@@ -59,6 +59,8 @@ VideoSinkResult open_bulk_sink(const std::string& text, const VideoSinkOptions& 
 VideoSinkResult open_tcp_sink(const std::string& address, const VideoSinkOptions& o);
 /// `text`: HOST[%INTERFACE]:PORT[,mtu=N][,mbit_s=N][,ttl=N].
 VideoSinkResult open_udp_video_sink(const std::string& text, const VideoSinkOptions& o);
+/// `text`: the same, and [,sdp=FILE], which is written.
+VideoSinkResult open_rtp_sink(const std::string& text, const VideoSinkOptions& o);
 /// The file is made or emptied.
 VideoSinkResult open_y4m_file(const std::string& path, const VideoSinkOptions& o);
 VideoSinkResult open_y4m_fifo(const std::string& path, const VideoSinkOptions& o);
@@ -69,6 +71,8 @@ VideoSourceResult open_v4l2_source(const std::string& path, const VideoFormat& f
 VideoSourceResult open_bridge_source(const std::string& address, const VideoFormat& format);
 /// `text`: udp_listener.h; the options of a sink have no effect.
 VideoSourceResult open_udp_video_source(const std::string& text, const VideoFormat& format);
+/// The same. It has the samples, whatever the link of the format.
+VideoSourceResult open_rtp_source(const std::string& text, const VideoFormat& format);
 VideoSourceResult open_y4m_source(const std::string& path, const VideoFormat& format);
 
 }  // namespace narpa

@@ -108,6 +108,13 @@ constexpr std::array kVideoSinks{
                    {},
                    Destination::port},
                   open_udp_video_sink},
+    VideoSinkKind{{"rtp:",
+                   "rtp:HOST:PORT",
+                   "rtp:HOST[%INTERFACE]:PORT[,sdp=FILE][,mtu=N][,mbit_s=N][,ttl=N] (RTP, RFC 4175)",
+                   {},
+                   {},
+                   Destination::port},
+                  open_rtp_sink},
     VideoSinkKind{{"", "FILE.y4m", "FILE.y4m", is_y4m_file, {}, Destination::new_file}, open_y4m_file},
     VideoSinkKind{{"", "an existing FIFO", "a FIFO (Y4M)", is_fifo, {}, Destination::device}, open_y4m_fifo},
     VideoSinkKind{{"", "none", "none", is_none}, open_null_video_sink},
@@ -116,12 +123,14 @@ constexpr std::span<const VideoSinkKind> kVideoSinkTable{kVideoSinks};
 
 struct VideoSourceKind : DeviceKind {
     VideoSourceResult (*open)(const std::string& rest, const VideoFormat& format);
+    bool has_samples = false;  ///< frames of samples; else as the link lays them out
 };
 constexpr std::array kVideoSources{
     VideoSourceKind{{"", "/dev/videoN", "/dev/videoN (V4L2 capture)", is_video_device}, open_v4l2_source},
     VideoSourceKind{{"bridge:", "bridge:PORT", "bridge:[ADDRESS:]PORT (a USB frame bridge in software)"},
                     open_bridge_source},
     VideoSourceKind{{"udp:", "udp:PORT", "udp:[ADDRESS[%INTERFACE]:]PORT (datagrams)"}, open_udp_video_source},
+    VideoSourceKind{{"rtp:", "rtp:PORT", "rtp:[ADDRESS[%INTERFACE]:]PORT (RTP, RFC 4175)"}, open_rtp_source, true},
     VideoSourceKind{{"", "FILE.y4m", "FILE.y4m (followed as it grows)", is_existing_y4m_file}, open_y4m_source},
     VideoSourceKind{{"", "an existing FIFO", "a FIFO (Y4M)", is_fifo}, open_y4m_source},
 };
@@ -211,7 +220,7 @@ VideoSourceResult open_video_source(std::string_view spec, const VideoFormat& fo
     if (kind == nullptr) return Error{name + "expected " + forms_of(kVideoSourceTable)};
     try {
         auto source = kind->open(kind->rest_of(text), format);
-        if (!source || format.link.is_samples()) return source;
+        if (!source || kind->has_samples || format.link.is_samples()) return source;
         return std::unique_ptr<VideoSource>(std::make_unique<SamplesOfLink>(*std::move(source), format));
     } catch (const std::exception& e) {  // no memory
         return Error{name + e.what(), {}, 0, 0, ErrorKind::missing};

@@ -1,5 +1,5 @@
-/// drivers/video/video_source.h - source of frames: a V4L2 capture device, a USB frame bridge, UDP datagrams, a Y4M
-/// FIFO or file.
+/// drivers/video/video_source.h - source of frames: a V4L2 capture device, a USB frame bridge, UDP datagrams, RTP
+/// packets, a Y4M FIFO or file.
 #pragma once
 
 #include <cstdint>

@@ -11,6 +11,7 @@ Pure Python, for programs that meet narpa on the wire or in files:
     narpa.dbc       DBC files: messages, signals, encoding
     narpa.y4m       video streams, as `narpa run --video CAMERA=FILE.y4m` writes them
     narpa.datagrams frames in UDP datagrams, as `narpa run --video CAMERA=udp:HOST:PORT` sends them
+    narpa.rtp       frames in RTP packets (RFC 4175), as `narpa run --video CAMERA=rtp:HOST:PORT,sdp=FILE` sends them
     narpa.vlp16     VLP-16 data packets, as `narpa run --lidar LIDAR=udp:HOST:PORT` sends them
     narpa.points    packets of LiDARs that are described by a file
     narpa.pcap      UDP datagrams of a capture

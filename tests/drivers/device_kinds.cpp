@@ -41,6 +41,7 @@ TEST(DeviceKinds, EachTextNamesItsKind) {
         {video_sink_kind, "/dev/video10", "/dev/videoN"},
         {video_sink_kind, "/dev/null", "/dev/videoN"},
         {video_sink_kind, "tcp:5000", "tcp:PORT"},
+        {video_sink_kind, "rtp:127.0.0.1:5004", "rtp:HOST:PORT"},
         {video_sink_kind, "b.y4m", "FILE.y4m"},
         {video_sink_kind, fifo, "an existing FIFO"},
         {video_sink_kind, "none", "none"},
@@ -61,6 +62,7 @@ TEST(DeviceKinds, OutputsOfOnePlaceAreFound) {
         return kind->place_of(sink);
     };
     EXPECT_EQ(place("udp:127.0.0.1:2368"), place("udp:127.0.0.1:2368,ttl=4"));
+    EXPECT_EQ(place("rtp:127.0.0.1:5004,sdp=a.sdp"), place("rtp:127.0.0.1:5004,sdp=b.sdp"));
     EXPECT_NE(place("udp:127.0.0.1:2368"), place("udp:127.0.0.1:2369"));
     EXPECT_EQ(place("/tmp/x/../a.y4m"), place("/tmp/a.y4m"));
     EXPECT_NE(place("/tmp/a.y4m"), place("/tmp/a.pcap"));
@@ -94,7 +96,7 @@ TEST(DeviceKinds, TheManualNamesAll) {
             EXPECT_NE(manual.find(word), std::string::npos) << word << " of " << help;
             at = end + 3;
         }
-    EXPECT_EQ(kinds, 7U + 8U + 5U);
+    EXPECT_EQ(kinds, 7U + 9U + 5U);
 }
 
 }  // namespace

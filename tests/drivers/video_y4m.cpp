@@ -293,8 +293,8 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
         std::string says;
     } cases[] = {
         {"nowhere", kGrey, ErrorKind::bad_input,
-         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, udp:HOST:PORT, FILE.y4m, an existing FIFO, or "
-         "none"},
+         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, udp:HOST:PORT, rtp:HOST:PORT, FILE.y4m, an "
+         "existing FIFO, or none"},
         {"", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "out.y4m",
          {8, 8, PixelFormat::rgb24, 1},
@@ -302,6 +302,13 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
          "it holds GREY, Y10, Y12, Y16 and YUYV"},
         {folder / "out.y4m", {8, 8, PixelFormat::bggr16, 1}, ErrorKind::bad_input, "cannot hold BGGR16 frames"},
         {folder / "no/such/folder.y4m", kGrey, ErrorKind::missing, "cannot write: No such file or directory"},
+        {"rtp", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
+        {"rtp:127.0.0.1:5004",
+         {8, 8, PixelFormat::bggr8, 100'000'000},
+         ErrorKind::bad_input,
+         "rtp:127.0.0.1:5004: RFC 4175 has no mosaics such as BGGR8"},
+        {"rtp:127.0.0.1:5004,sdp=" + (folder / "no/such/folder.sdp"), kGrey, ErrorKind::missing,
+         "folder.sdp\": No such file or directory"},
         {"none", {0, 8, PixelFormat::grey, 1}, ErrorKind::bad_input, "must be positive"},
         {"none", {7, 8, PixelFormat::yuyv, 1}, ErrorKind::bad_input, "even width, not 7"},
         {"none", {8, 7, PixelFormat::rggb8, 1}, ErrorKind::bad_input, "RGGB8 needs an even height, not 7"},

@@ -29,7 +29,7 @@ set(CPACK_DEBIAN_DEV_DESCRIPTION "Libraries of the camera and LiDAR emulator nar
 Headers, static libraries, the CMake package, and the program of `narpa bench`.")
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "narpa (= ${PROJECT_VERSION})")
-set(CPACK_DEBIAN_DEV_PACKAGE_SUGGESTS "libembree-dev, libtbb-dev, libopencv-dev, libeigen3-dev, libceres-dev, nlohmann-json3-dev, liberfa-dev, libfmt-dev, libtomlplusplus-dev, libopenexr-dev, libpcap-dev, libusb-1.0-0-dev, zlib1g-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_SUGGESTS "libembree-dev, libtbb-dev, libopencv-dev, libeigen3-dev, libceres-dev, nlohmann-json3-dev, liberfa-dev, libfmt-dev, libtomlplusplus-dev, libopenexr-dev, libpcap-dev, libusb-1.0-0-dev, libaravis-dev, zlib1g-dev")
 
 set(CPACK_DEBIAN_DOC_PACKAGE_NAME narpa-doc)
 set(CPACK_DEBIAN_DOC_DESCRIPTION "Documents of the camera and LiDAR emulator narpa

@@ -61,6 +61,8 @@ VideoSinkResult open_tcp_sink(const std::string& address, const VideoSinkOptions
 VideoSinkResult open_udp_video_sink(const std::string& text, const VideoSinkOptions& o);
 /// `text`: the same, and [,sdp=FILE], which is written.
 VideoSinkResult open_rtp_sink(const std::string& text, const VideoSinkOptions& o);
+/// `address`: of an interface of this machine, IPv4; empty: the loopback.
+VideoSinkResult open_gige_sink(const std::string& address, const VideoSinkOptions& o);
 /// The file is made or emptied.
 VideoSinkResult open_y4m_file(const std::string& path, const VideoSinkOptions& o);
 VideoSinkResult open_y4m_fifo(const std::string& path, const VideoSinkOptions& o);

@@ -115,6 +115,8 @@ constexpr std::array kVideoSinks{
                    {},
                    Destination::port},
                   open_rtp_sink},
+    VideoSinkKind{{"gige:", "gige:[ADDRESS]", "gige:[ADDRESS] (a GigE Vision camera)", {}, {}, Destination::port},
+                  open_gige_sink},
     VideoSinkKind{{"", "FILE.y4m", "FILE.y4m", is_y4m_file, {}, Destination::new_file}, open_y4m_file},
     VideoSinkKind{{"", "an existing FIFO", "a FIFO (Y4M)", is_fifo, {}, Destination::device}, open_y4m_fifo},
     VideoSinkKind{{"", "none", "none", is_none}, open_null_video_sink},

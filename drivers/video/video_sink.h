@@ -1,5 +1,5 @@
 /// drivers/video/video_sink.h - sink of frames: a V4L2 output device, a USB camera or frame bridge, Y4M to a file,
-/// a FIFO or TCP clients, UDP datagrams, RTP packets, or none.
+/// a FIFO or TCP clients, UDP datagrams, RTP packets, a GigE Vision camera, or none.
 ///
 /// A sink owns a thread and a ring of preallocated frames, so that handing over a frame is one copy: no disk,
 /// reader or device can block the loop.

@@ -42,6 +42,7 @@ TEST(DeviceKinds, EachTextNamesItsKind) {
         {video_sink_kind, "/dev/null", "/dev/videoN"},
         {video_sink_kind, "tcp:5000", "tcp:PORT"},
         {video_sink_kind, "rtp:127.0.0.1:5004", "rtp:HOST:PORT"},
+        {video_sink_kind, "gige:", "gige:[ADDRESS]"},
         {video_sink_kind, "b.y4m", "FILE.y4m"},
         {video_sink_kind, fifo, "an existing FIFO"},
         {video_sink_kind, "none", "none"},
@@ -96,7 +97,7 @@ TEST(DeviceKinds, TheManualNamesAll) {
             EXPECT_NE(manual.find(word), std::string::npos) << word << " of " << help;
             at = end + 3;
         }
-    EXPECT_EQ(kinds, 7U + 9U + 5U);
+    EXPECT_EQ(kinds, 7U + 10U + 5U);
 }
 
 }  // namespace

@@ -293,8 +293,8 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
         std::string says;
     } cases[] = {
         {"nowhere", kGrey, ErrorKind::bad_input,
-         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, udp:HOST:PORT, rtp:HOST:PORT, FILE.y4m, an "
-         "existing FIFO, or none"},
+         "expected /dev/videoN, uvc:PORT, bulk:[BRIDGE], tcp:PORT, udp:HOST:PORT, rtp:HOST:PORT, gige:[ADDRESS], "
+         "FILE.y4m, an existing FIFO, or none"},
         {"", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "out.y4m",
          {8, 8, PixelFormat::rgb24, 1},
@@ -303,6 +303,7 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
         {folder / "out.y4m", {8, 8, PixelFormat::bggr16, 1}, ErrorKind::bad_input, "cannot hold BGGR16 frames"},
         {folder / "no/such/folder.y4m", kGrey, ErrorKind::missing, "cannot write: No such file or directory"},
         {"rtp", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
+        {"gige", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
         {"rtp:127.0.0.1:5004",
          {8, 8, PixelFormat::bggr8, 100'000'000},
          ErrorKind::bad_input,

@@ -184,7 +184,7 @@ Result<LatencyRow> measure_sink(const std::string& spec, const LatencySettings& 
     LatencyEnds ends;
     ends.send = [&](std::uint32_t k) {
         put_le(to_send.data(), k);
-        return e.sink->send(to_send, {std::int64_t{k}, k});
+        return e.sink->send(to_send, {.t_ns = k * s.format.period_ns, .number = k});
     };
     ends.receive = [&](std::int64_t timeout_ns) -> std::optional<std::uint32_t> {
         if (e.source) {

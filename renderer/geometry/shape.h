@@ -67,6 +67,7 @@ struct BoxNode {
 struct EmitterView {
     Quat q_world_body{};
     Vec3 apart{}, offset{};
+    Vec3 up{};         ///< unit, world axes; only light from this hemisphere counts
     bool own = false;  ///< the receiver is a point of the body's own surface
 
     /// From the receiver to a point of the body's frame, world axes.
@@ -92,7 +93,7 @@ public:
     /// False where sampling is useless: the light cannot reach the receiver, or every ray hits the surface.
     [[nodiscard]] virtual bool is_worth_sampling(const EmitterView&) const noexcept { return true; }
     struct Sample {
-        Vec3 direction{};        ///< world, unit, from the receiver
+        Vec3 direction{};        ///< world, unit, from the receiver; not finite: no light can arrive
         std::uint32_t face = 0;  ///< only light from this face counts
     };
     [[nodiscard]] virtual Sample sample(const EmitterView& view, double choice, double u,

@@ -38,7 +38,7 @@ double per_solid_angle(double per_area, double range_m, double cosine) {
 }
 
 EmitterView view_of(const Receiver& to, const Rigid3& T_world_body, int body) {
-    return {T_world_body.q, T_world_body.t - to.anchor, to.offset, body == to.body};
+    return {T_world_body.q, T_world_body.t - to.anchor, to.offset, to.up, body == to.body};
 }
 
 }  // namespace
@@ -147,7 +147,7 @@ std::optional<LightSample> Lights::sample(const BodyPoses& at, const Receiver& t
         s.body = chosen->body;
         s.direction = direction, s.face = face;
     }
-    if (!is_finite(s.direction)) return std::nullopt;  // the receiver is at the light's position
+    if (!is_finite(s.direction)) return std::nullopt;  // no light can arrive, or the receiver is at its position
     return s;
 }
 

@@ -226,6 +226,36 @@ TEST(MeshLamp, IsLambertsPolygonFormulaFromBothSides) {
     }
 }
 
+/// A floor below a row of lamps of one mesh. If faces were chosen by power alone, the error of so many samples
+/// would be 14 times as large.
+TEST(MeshLamp, ManyInARowAddUpAndTheNearOnesAreSampledMost) {
+    Scene s = floor_scene();
+    s.materials.push_back(shining(0, {7, 6, 5}));
+    Mesh row;
+    double expected = 0;
+    for (int k = -12; k <= 12; ++k) {
+        Mesh panel = plate(0.4, 0.25);
+        for (auto& p : panel.positions) p.x += 1.5f * static_cast<float>(k), p.z += 0.6f;
+        const auto first = static_cast<std::uint32_t>(row.positions.size());
+        row.positions.insert(row.positions.end(), panel.positions.begin(), panel.positions.end());
+        for (auto face : panel.faces) {
+            for (auto& corner : face) corner += first;
+            row.faces.push_back(face);
+        }
+        const double x = 1.5 * k;
+        expected +=
+            7 * polygon_irradiance(
+                    {{x - 0.2, -0.125, 0.6}, {x + 0.2, -0.125, 0.6}, {x + 0.2, 0.125, 0.6}, {x - 0.2, 0.125, 0.6}},
+                    {}, {0, 0, 1});
+    }
+    row.name = "row";
+    row.face_material.assign(row.faces.size(), 1);
+    add_mesh(s, std::move(row));
+    const Estimate e = irradiance_at(s, 0, 0, 512);
+    EXPECT_NEAR(e.mean.x, expected, kSigmas * e.error + 1e-6 * expected);
+    EXPECT_LT(e.error, 0.003 * expected);
+}
+
 TEST(TexturedLamp, ShinesAsItsTextureSays) {
     // Half of the panel is dark: half of what an even panel would send, and far enough away that it does not matter
     // which.

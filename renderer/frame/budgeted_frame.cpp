@@ -42,7 +42,9 @@ public:
           centre_(make_frame(render_scene, at, camera, pose, centre_settings_)),
           sample_(make_frame(render_scene, at, camera, pose, sample_settings_)),
           adaptive_(sample_.parts == LightParts::direct && settings.mechanisms.sample_plan),
-          separate_sunlight_(sample_.parts == LightParts::both && settings.mechanisms.sample_plan),
+          separate_sunlight_(sample_.thins_paths && settings.mechanisms.sample_plan),
+          separate_emission_(sample_.parts == LightParts::both && !sample_.thins_paths &&
+                             settings.mechanisms.sample_plan),
           out_(out),
           variance_(variance) {}
 
@@ -51,7 +53,7 @@ public:
         begin(adaptive_ || separate_sunlight_ ? centre_ : sample_);
         if (separate_sunlight_ && worth_sunlight() && plan_sunlight())
             take_first_samples(limit());
-        else
+        else if (!(separate_emission_ && worth_sunlight() && plan_emission_and_take_first_samples()))
             take_first_image();
         if (passes_.pixels() == 0 && account_.step == FrameStep::one_sample)
             account_.standard_error = 0;  // nothing in view
@@ -164,11 +166,12 @@ private:
             case BudgetKind::samples:
             case BudgetKind::aim: return false;
             case BudgetKind::passes: return budget_.passes[kSunlightPass] > 0;
-            case BudgetKind::rays: return static_cast<double>(budget_.rays) >= kMinRaysForSunlight * pixels;
+            case BudgetKind::rays:
+                return separate_sunlight_ && static_cast<double>(budget_.rays) >= kMinRaysForSunlight * pixels;
             case BudgetKind::time:
                 return costs_.known(Of::samples) && worth_planning() &&
                        static_cast<double>(costs_.fitting(Of::samples, ns_left())) >=
-                           kMinSamplesForSunlight * pixels;
+                           (separate_emission_ ? kUniformSamplesBesideEmission : kMinSamplesForSunlight) * pixels;
         }
         return false;
     }
@@ -179,6 +182,26 @@ private:
         passes_.plan_sunlight(centre_);
         costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
         return sunlight_planned_ = true;
+    }
+    /// The same for emission in view; then takes one sample per pixel. False if that did not fit.
+    bool plan_emission_and_take_first_samples() {
+        const PassLimit l = limit();
+        const PassCount pass = passes_.centres(sample_, l, false);
+        if (!account_for(pass, l, false)) return false;
+        discard();
+        const std::int64_t start = now_ns();
+        sunlight_planned_ = passes_.plan_sunlight(sample_);
+        costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
+        if (take_first_samples(limit())) return true;
+        return sunlight_planned_ = false;
+    }
+    /// True if centres and one sample per pixel are expected to fit; samples of emission get the rest. A pass that
+    /// does not fit loses its rays, and the pilot pass of a small image says little.
+    [[nodiscard]] bool emission_fits() const {
+        const auto pixels = static_cast<double>(passes_.pixels());
+        const double pilot_tiles = std::max(1.0, pixels / (kTilePixels * kPilotPart));
+        return (rays_each_.sample + rays_each_.path + 1) * pixels * (1 + 1 / std::sqrt(pilot_tiles)) <=
+               kMaxPilotPrediction * static_cast<double>(rays_left());
     }
     /// Two samples per pixel are needed to estimate the error of paths.
     [[nodiscard]] bool two_samples_fit() const {
@@ -242,7 +265,7 @@ private:
 
     /// Light by paths is sampled uniformly if so many samples of each pixel are expected to fit.
     [[nodiscard]] std::uint64_t uniform_samples() const {
-        return sample_.parts == LightParts::both ? kUniformSamples : 1;
+        return sample_.thins_paths ? kUniformSamples : separate_emission_ ? kUniformSamplesBesideEmission : 1;
     }
     /// A pilot pass over a sixteenth of the tiles measures the number of rays per sample; the other tiles follow if
     /// a few samples of each pixel are expected to fit.
@@ -251,6 +274,10 @@ private:
         PassLimit part = limit();
         part.rays /= 2;
         if (!take_first_samples(part, Tiles::pilot)) return false;
+        if (separate_emission_) {
+            discard();
+            return emission_fits() && plan_emission_and_take_first_samples();
+        }
         const std::uint64_t taken = account_.samples;
         const PassLimit rest = limit();
         if ((rays_each_.sample + rays_each_.path) *
@@ -432,7 +459,9 @@ private:
         return pixels >= left ? PixelFill::all() : plan.reach(from, pixels);
     }
     /// Passes of the account that may fill the image.
-    [[nodiscard]] std::size_t most_fills() const { return separate_sunlight_ ? kSunlightPass : kMaxPasses; }
+    [[nodiscard]] std::size_t most_fills() const {
+        return separate_sunlight_ || separate_emission_ ? kSunlightPass : kMaxPasses;
+    }
     /// Pixels that fit into the rest of the budget.
     [[nodiscard]] double fitting_pixels() const {
         switch (budget_.kind) {
@@ -470,10 +499,10 @@ private:
             costs_.record(Of::plan, passes_.pixels(), now_ns() - start);
             account_.standard_error = passes_.standard_error();
         }
-        if (sunlight_planned_) sunlight_planned_ = mostly_separate_ && two_samples_fit();
-        const std::size_t passes = separate_sunlight_ ? kSunlightPass : kMaxPasses;
+        if (sunlight_planned_ && separate_sunlight_) sunlight_planned_ = mostly_separate_ && two_samples_fit();
+        const std::size_t passes = most_fills();
         for (std::size_t i = fills_; i < passes; ++i) {
-            const Stage next = sunlight_planned_ ? SamplePlan::whole(wanted(i)) : wanted(i);
+            const Stage next = sunlight_planned_ && separate_sunlight_ ? SamplePlan::whole(wanted(i)) : wanted(i);
             const std::uint64_t samples = passes_.plan().total(next) - passes_.plan().total(stage_);
             if (samples == 0 && i == fills_ && budget_.kind == BudgetKind::time && worth_a_pass())
                 costs_.decay(Of::samples);
@@ -489,19 +518,19 @@ private:
             stage_ = next;
             rays_each_ = rays_each(pass);
         }
-        if (sunlight_planned_ && SamplePlan::reaches(stage_, 2)) refine_sunlight();
+        if (sunlight_planned_ && (separate_emission_ || SamplePlan::reaches(stage_, 2))) refine_sunlight();
     }
 
     /// Spends what the uniform passes have left of the budget.
     void refine_sunlight() {
-        const std::uint32_t each = SamplePlan::samples_of(stage_);
+        const std::uint32_t each = SamplePlan::least_of(stage_);
         const SamplePlan& plan = passes_.sunlight_plan();
         const Stage to = plan.reach_beyond(each, sunlight_samples());
         const std::uint64_t samples = plan.total_beyond(each, to);
         if (samples == 0) return;
         if (to_show_ == ToShow::means) show();
         const PassLimit l = limit();
-        const PassCount pass = passes_.refine_sunlight(sample_, each, to, l);
+        const PassCount pass = passes_.refine_sunlight(sample_, stage_, to, l);
         costs_.record(Of::sunlight, pass.samples, pass.wall_ns);
         if (!account_for(pass, l, false)) return;
         account_.passes[kSunlightPass] = static_cast<std::uint32_t>(samples);
@@ -510,7 +539,8 @@ private:
     [[nodiscard]] double sunlight_samples() const {
         if (budget_.kind == BudgetKind::passes) return budget_.passes[kSunlightPass];
         if (budget_.kind == BudgetKind::rays)
-            return std::min(static_cast<double>(rays_left()) / kMaxRaysOfSunlight, kMaxSamples);
+            return std::min(static_cast<double>(rays_left()) / (separate_emission_ ? 1 : kMaxRaysOfSunlight),
+                            kMaxSamples);
         return std::min(kSunlightPassTime * static_cast<double>(costs_.fitting(Of::sunlight, ns_left())),
                         kMaxSamples);
     }
@@ -540,7 +570,7 @@ private:
                                 : pass == fills_ ? (filled_ ? kFirstSparseRays : kFirstPassRays)
                                                  : kNextPassRaysOfPaths;
             // By contrast, samples come in powers of two. In light of two parts, half of these have paths.
-            const double with_paths = !by_contrast() ? 0 : sample_.parts == LightParts::both ? 0.5 : 1;
+            const double with_paths = !by_contrast() ? 0 : sample_.thins_paths ? 0.5 : 1;
             const double each = rays_each_.sample + with_paths * rays_each_.path;
             return plan.reach(stage_, std::min(part * left, kMaxSamples), each, rays_each_.path);
         }
@@ -557,7 +587,7 @@ private:
     }
     /// The part of the budget reserved for sunlight samples.
     [[nodiscard]] double for_sunlight(double budget) const {
-        return sunlight_planned_ ? kSunlightPart * budget : 0;
+        return sunlight_planned_ ? (separate_emission_ ? kEmissionPart : kSunlightPart) * budget : 0;
     }
 
     /// Planning cannot be interrupted, so it is begun only if time is left for samples.
@@ -587,7 +617,7 @@ private:
     const FrameSettings &settings_, centre_settings_, sample_settings_;
     const Frame centre_;
     Frame sample_;
-    const bool adaptive_, separate_sunlight_;
+    const bool adaptive_, separate_sunlight_, separate_emission_;
     RadianceImage& out_;
     std::vector<float>* const variance_;
 

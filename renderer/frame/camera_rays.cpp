@@ -80,7 +80,7 @@ constexpr std::uint32_t kPathsOwn = 2;
 /// Aims the camera rays. Points on the Sun are chosen only if it is the only light or is sampled separately; paths
 /// choose their own.
 void aim_at_mid_exposure(const Frame& f, const CameraSamples& s, TracedRays& p) noexcept {
-    const bool sun = f.sun && f.parts != LightParts::path;
+    const bool sun = f.sun && (f.parts == LightParts::direct || f.thins_paths);
     p.rays.n = s.n;
     if (s.centre && f.one_sample()) {
         aim_at_centres(f, s, p.rays);

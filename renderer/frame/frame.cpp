@@ -26,7 +26,7 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
         .pixel_angle_rad = 1 / (model->pixels_per_radian() * std::sqrt(settings.spp)),
         .direct = direct,
         .small_bodies = !direct && on.small_body_sampling && SmallBodySampling::may_help(tracer, at),
-        .first_survival = parts == LightParts::both && settings.spp > 1 ? 1 : tuning::kReducedSurvival,
+        .first_survival = integrator.thins_paths() && settings.spp > 1 ? 1 : tuning::kReducedSurvival,
         // Paths at different times see moving bodies at different places.
         .reuse = on.path_reuse && !(over_time && at.moving()),
     };
@@ -43,6 +43,7 @@ Frame make_frame(const RenderScene& render_scene, const BodyPoses& at, const Cam
             render_scene.lights().sun(),
             integrator,
             parts,
+            integrator.thins_paths(),
             {render_scene, at, path, settings.seed, settings.frame},
             SubpixelBodies(tracer, at, camera, model, pose.middle(), lens, over_time)};
 }

@@ -26,6 +26,7 @@ struct Frame {
     const std::optional<SunDisc>& sun;
     const Integrator& integrator;
     LightParts parts;  ///< the integrator's
+    bool thins_paths;  ///< likewise
     Transport transport;
     SubpixelBodies subpixel_bodies;
 

@@ -62,9 +62,9 @@ void FrameError::add(const PixelMeans& means) noexcept {
 void FrameError::add_tile(const TileContrast* contrast, const PerPixel<PixelMeans>& means) noexcept {
     for (std::size_t i = 0; i < kTilePixels; ++i) {
         const std::uint32_t samples = means[i].count();
-        if (samples > 1)
-            add(means[i]);
-        else if (contrast != nullptr)
+        if (samples > 1) add(means[i]);
+        // Beside one path there may be more samples of the direct part: the contrast is then that of paths alone.
+        if (contrast != nullptr && (samples <= 1 || means[i].path.count() == 1))
             from_contrasts_ += static_cast<double>(samples == 0 ? contrast->centre[i] : contrast->of_sample(i));
     }
 }

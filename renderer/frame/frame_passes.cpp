@@ -286,9 +286,11 @@ void FramePasses::estimate_centres(const Frame& f) {
     });
 }
 
-PassCount FramePasses::centres(const Frame& f, const PassLimit& limit) {
-    return over_tiles(f, Sums::counts, limit,
-                      [&](Worker& w, const Tile& t) { w.centres(t, camera_.width, kAllPlaces, g_buffer_); });
+PassCount FramePasses::centres(const Frame& f, const PassLimit& limit, bool with_paths) {
+    return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
+        w.with_paths = with_paths;
+        w.centres(t, camera_.width, kAllPlaces, g_buffer_);
+    });
 }
 
 void FramePasses::show_centres(const Frame& f, RadianceImage& out, std::vector<float>* variance) {
@@ -374,6 +376,7 @@ void FramePasses::make_plan(const Frame& f, bool adaptive) {
 PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
                               Tiles which) {
     assert(plan_ && to.level >= from.level);
+    if (from == SamplePlan::none()) direct_apart_ = false;
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         if (which != Tiles::all && is_pilot_tile(t.x / kTile, t.y / kTile) != (which == Tiles::pilot)) return;
         const auto begin = [&](std::size_t at) { return plan_->count(t.index, at, from); };
@@ -393,18 +396,22 @@ PassCount FramePasses::refine(const Frame& f, SamplePlan::Stage from, SamplePlan
     });
 }
 
-void FramePasses::plan_sunlight(const Frame& f) {
+bool FramePasses::plan_sunlight(const Frame& f) {
     if (tiles_.size() < g_buffer_.tiles()) sunlight_plan_->clear();
     sunlight_plan_->make_adaptive(f, g_buffer_, tiles_);
+    return sunlight_plan_->any_contrast();
 }
 
-PassCount FramePasses::refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to,
+PassCount FramePasses::refine_sunlight(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to,
                                        const PassLimit& limit) {
     assert(sunlight_plan_ && f.parts == LightParts::both);
+    direct_apart_ = true;
     return over_tiles(f, Sums::counts, limit, [&](Worker& w, const Tile& t) {
         w.with_paths = false;
-        const auto begin = [&](std::size_t) { return each; };
-        const auto end = [&](std::size_t at) { return std::max(each, sunlight_plan_->count(t.index, at, to)); };
+        const auto begin = [&](std::size_t at) { return plan_->count(t.index, at, from); };
+        const auto end = [&](std::size_t at) {
+            return std::max(begin(at), sunlight_plan_->count(t.index, at, to));
+        };
         PerPixel<PixelMeans>& means = means_[t.index];
         w.samples(t, camera_.width, begin, end,
                   [&](const SampleBatch& b, const TracedRays&, const BatchRadiance& light) {
@@ -419,6 +426,8 @@ void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, bool fille
     fill_background(out);
     const double part = part_not_noise(f);
     const bool uniform = plan_->is_uniform();
+    // One sample of the paths, more of the direct part.
+    const bool one_path = uniform && direct_apart_ && !SamplePlan::reaches(stage, 2);
     // The plan's contrasts are those of direct light alone.
     const bool needs_contrast =
         uniform ? variance != nullptr || !SamplePlan::reaches(stage, 2) : f.parts != LightParts::direct;
@@ -430,10 +439,11 @@ void FramePasses::show_means(const Frame& f, SamplePlan::Stage stage, bool fille
                 means[at].count() > 0 ? vec_cast<float>(means[at].mean()) : radiance_at(centres, at);
         });
         TileContrast of_samples;
-        if (needs_contrast) g_buffer_.contrast(f, t.index, of_samples);
+        if (needs_contrast && one_path) g_buffer_.contrast_of_paths(f, t.index, of_samples);
+        if (needs_contrast && !one_path) g_buffer_.contrast(f, t.index, of_samples);
         const TileContrast& contrast = uniform || needs_contrast ? of_samples : plan_->contrast(t.index);
         w.error.add_tile(uniform && !needs_contrast ? nullptr : &contrast, means);
-        if (variance != nullptr) put_variances(t, means, contrast, out.width, *variance);
+        if (variance != nullptr) put_variances(t, means, contrast, one_path, out.width, *variance);
         if (filled)
             t.each_pixel([&](int x, int y, std::size_t at) {
                 if (means[at].count() > 0 || fill_->is_traced(t.index, at)) return;

@@ -60,8 +60,8 @@ public:
 
     /// Tiles that a pass covers; those of the pilot pass are a sixteenth, evenly spread.
     enum class Tiles : std::uint8_t { all, pilot, all_but_pilot };
-    /// Traces the centres of all pixels.
-    PassCount centres(const Frame& f, const PassLimit& limit);
+    /// Traces the centres of all pixels. `with_paths`: false for the direct part of the light alone.
+    PassCount centres(const Frame& f, const PassLimit& limit, bool with_paths = true);
     /// Writes the centres to the image.
     void show_centres(const Frame& f, RadianceImage& out, std::vector<float>* variance);
 
@@ -87,13 +87,13 @@ public:
     PassCount refine(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit,
                      Tiles which = Tiles::all);
 
-    /// If direct sunlight is separate: plans further samples of it from the contrasts of the centres, which must
-    /// come from a direct-light frame.
-    void plan_sunlight(const Frame& f);
+    /// If direct sunlight or emission in view is separate: plans further samples of it from the contrasts of the
+    /// centres, which must be those of this light alone. False: there are none.
+    bool plan_sunlight(const Frame& f);
     [[nodiscard]] const SamplePlan& sunlight_plan() const noexcept { return *sunlight_plan_; }
-    /// Traces samples of direct sunlight alone: for each pixel those beyond the first `each`, up to stage `to` of
-    /// that plan.
-    PassCount refine_sunlight(const Frame& f, std::uint32_t each, SamplePlan::Stage to, const PassLimit& limit);
+    /// Traces samples of this light alone: for each pixel those beyond the ones of stage `from` of the uniform
+    /// plan, up to stage `to` of that plan.
+    PassCount refine_sunlight(const Frame& f, SamplePlan::Stage from, SamplePlan::Stage to, const PassLimit& limit);
 
     /// Writes the pixels' means at a stage of the plan to the image. `filled`: pixels without a sample are
     /// reconstructed.
@@ -135,6 +135,7 @@ private:
     std::optional<SamplePlan> plan_, sunlight_plan_;  ///< allocated when first needed, as is means_
     std::vector<PerPixel<PixelMeans>> means_;
     std::optional<PixelFill> fill_;  ///< likewise
+    bool direct_apart_ = false;      ///< `means_` has samples of the direct part alone
 
     // Tiles that still hold the background in the image that was last written, and that image's pixels and
     // background.

@@ -7,7 +7,8 @@
 /// sampling techniques for image synthesis", SIGGRAPH 1991). All other light gets uniform passes, whose samples all
 /// count; but where only few samples per pixel fit, edges cause most of the error, and centres come first here too.
 /// So they do if the Sun is the only source of direct light and the budget is large: after the uniform passes their
-/// contrasts decide where further samples of direct sunlight go. The number of samples of a pass is fixed before it
+/// contrasts decide where further samples of direct sunlight go; where lamps can be in view, those of emission that
+/// camera rays meet. The number of samples of a pass is fixed before it
 /// begins, and a pass that does not end in time is discarded as a whole. So a frame is a function of the scene, the
 /// poses, its number, the seed and the sizes of its passes: the clock only chooses these sizes.
 #pragma once
@@ -23,7 +24,7 @@
 namespace narpa {
 
 inline constexpr std::size_t kMaxPasses = 8;  ///< after the first
-/// Path-traced frames with separate direct sunlight: the pass of direct sunlight samples.
+/// Path-traced frames with separate direct sunlight or emission in view: the pass of samples of that light alone.
 inline constexpr std::size_t kSunlightPass = kMaxPasses - 1;
 
 /// How far a frame got. Stated in its ledger.
@@ -83,8 +84,9 @@ struct Mechanisms {
     bool edge_classes = true;  ///< pixels next to an edge share its weight; off: each pixel's own contrast only
     bool path_reuse = true;    ///< path_reuse.h; off: each path serves its own pixel
     bool small_body_sampling = true;  ///< small_body_sampling.h; off: BSDF sampling only
-    bool separate_sun = true;         ///< more samples for direct sunlight at first hits than for paths
-    bool tile_culling = true;         ///< tile_culling.h; off: every tile is traced against every body
+    bool separate_sun =
+        true;  ///< more samples for direct sunlight at first hits, and for emission in view, than for paths
+    bool tile_culling = true;  ///< tile_culling.h; off: every tile is traced against every body
 };
 
 struct FrameSettings {

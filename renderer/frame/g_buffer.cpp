@@ -334,6 +334,15 @@ void GBuffer::contrast_of_direct(const Frame& f, std::size_t tile, TileContrast&
         f, tile, [this](std::size_t t, std::size_t place) { return direct_[t][place]; }, false, out);
 }
 
+void GBuffer::contrast_of_paths(const Frame& f, std::size_t tile, TileContrast& out) const noexcept {
+    assert(parts_ == LightParts::both);
+    const auto rest = [this](std::size_t t, std::size_t place) {
+        const GBufferTile& of = tiles_[t];
+        return (of.r[place] + of.g[place] + of.b[place]) / 3 - direct_[t][place];
+    };
+    contrast(f, tile, rest, true, out);
+}
+
 void GBuffer::put_like(std::size_t tile, std::size_t place, std::size_t other, std::size_t there) noexcept {
     GBufferTile& t = tiles_[tile];
     const GBufferTile& like = tiles_[other];

@@ -127,6 +127,9 @@ public:
     /// The same, in light of two parts of the direct one alone, which has no noise.
     void contrast_of_direct(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
 
+    /// The same, in light of two parts without the direct one.
+    void contrast_of_paths(const Frame& f, std::size_t tile, TileContrast& out) const noexcept;
+
     /// A pixel without a sample shows the surface that another one does.
     void put_like(std::size_t tile, std::size_t place, std::size_t other, std::size_t there) noexcept;
     void put_background(std::size_t tile, std::size_t place) noexcept;

@@ -117,6 +117,7 @@ void SamplePlan::make_adaptive(const Frame& f, const GBuffer& g_buffer, std::spa
         all.variance += sums_[tile].variance;
         all.deviation += sums_[tile].deviation;
     }
+    any_contrast_ = all.variance > 0;
     const double typical = all.variance > 0 ? all.variance / all.deviation : 1;
     for (auto& bin : histogram_) bin.store(0, std::memory_order_relaxed);
     over_tiles(tiles, [&](const auto& range) {
@@ -135,7 +136,7 @@ void SamplePlan::clear() noexcept {
 void SamplePlan::contrast_tile(const Frame& f, const GBuffer& g_buffer, std::size_t tile) noexcept {
     TileContrast& c = contrasts_[tile];
     g_buffer.contrast(f, tile, c);
-    if (f.parts == LightParts::both) {
+    if (f.thins_paths) {
         // A weight leaves out the noise values that contain the pixel's own centre, but not its edges.
         TileContrast direct;
         g_buffer.contrast_of_direct(f, tile, direct);
@@ -181,7 +182,7 @@ void SamplePlan::set_weights(const Frame& f, const GBuffer& g_buffer, std::uint3
 void SamplePlan::make_uniform(const Frame& f, std::span<const std::uint32_t> tiles) {
     const int width = f.camera.width, height = f.camera.height;
     uniform_ = true;
-    all_by_paths_ = f.parts != LightParts::both;
+    all_by_paths_ = !f.thins_paths;
     pixels_of_rank_.fill(0);
     const int tiles_x = (width + kTile - 1) / kTile;
     for (const std::uint32_t tile : tiles) {

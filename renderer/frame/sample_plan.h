@@ -14,8 +14,8 @@
 ///
 /// Uniform sampling, for all other frames: every pixel gets the same number of samples, and those in the tiles of a
 /// fixed pattern one more; whole tiles, because paths are reused within a tile. With paths, noise is everywhere,
-/// and an adaptive plan measured no better at equal error (docs/performance.md). But separate direct sunlight gets
-/// samples of its own by an adaptive plan beside the uniform one.
+/// and an adaptive plan measured no better at equal error (docs/performance.md). But separate direct sunlight,
+/// and emission in view, get samples of their own by an adaptive plan beside the uniform one.
 #pragma once
 
 #include <algorithm>
@@ -42,6 +42,8 @@ public:
     /// Adaptive: sets the weights of the pixels of these tiles by the G-buffer, in parallel. No pixel has samples
     /// yet.
     void make_adaptive(const Frame& f, const GBuffer& g_buffer, std::span<const std::uint32_t> tiles);
+    /// Adaptive: true if some pixel differs from its neighbours.
+    [[nodiscard]] bool any_contrast() const noexcept { return any_contrast_; }
     /// Resets all pixels to no samples; later calls of `make_adaptive` set those of their tiles.
     void clear() noexcept;
     /// Uniform, over these tiles of the frame's image.
@@ -77,7 +79,8 @@ public:
     [[nodiscard]] static Stage whole(Stage stage) noexcept {
         return samples_each((std::max(stage.level, 0) + kRanks / 2) / kRanks);
     }
-    [[nodiscard]] static std::uint32_t samples_of(Stage whole) noexcept { return of_rank(0, whole); }
+    /// Uniform: the least number of samples of a pixel.
+    [[nodiscard]] static std::uint32_t least_of(Stage stage) noexcept { return of_rank(kRanks - 1, stage); }
     /// Adaptive: samples beyond the first `each` of every pixel, of all pixels.
     [[nodiscard]] std::uint64_t total_beyond(std::uint32_t each, Stage stage) const noexcept;
     /// The furthest stage with at most this many such samples.
@@ -111,7 +114,7 @@ private:
     void set_weights(const Frame& f, const GBuffer& g_buffer, std::uint32_t tile, double typical_variance,
                      Histogram& histogram) noexcept;
 
-    bool uniform_ = false;
+    bool uniform_ = false, any_contrast_ = false;
     bool all_by_paths_ = false;  ///< uniform: every sample has a path; else as paths_of()
     std::vector<TileContrast> contrasts_;
     std::vector<PerPixel<Weight>> weights_;

@@ -221,7 +221,7 @@ private:
         const std::uint32_t all = lanes_below(b.samples.n);
         b.direct_lanes = f.parts == LightParts::path ? 0 : all;
         b.path_lanes = f.parts == LightParts::direct || !with_paths ? 0 : all;
-        if (f.parts == LightParts::both && with_paths)
+        if (f.thins_paths && with_paths)
             for_each_lane(all, [&](std::size_t i) {
                 if (!has_path(b.samples.sample[i])) b.path_lanes &= ~(1u << i);
                 p.sample[i] = paths_of(b.samples.sample[i]);
@@ -327,15 +327,18 @@ void add_variances(const Tile& t, const PerPixel<PixelSamples>& spread, const Pe
     });
 }
 
-/// Sets the variance where pixels have different numbers of samples, or show their centres.
+/// Sets the variance where pixels have different numbers of samples, or show their centres. `of_paths`: the
+/// contrast is that of paths alone.
 template <class Tile>
-void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileContrast& contrast, int image_width,
-                   std::vector<float>& variance) {
+void put_variances(const Tile& t, const PerPixel<PixelMeans>& means, const TileContrast& contrast, bool of_paths,
+                   int image_width, std::vector<float>& variance) {
     const auto of_path = [&](std::size_t at) {
-        const bool alone = means[at].direct.count() == 0;
+        const bool alone = of_paths || means[at].direct.count() == 0;
         return contrast.reused[at] + (alone ? contrast.edge[at] + std::max(contrast.noise[at], 0.0f) : 0);
     };
-    const auto of_direct = [&](std::size_t at) { return contrast.edge[at] + std::max(contrast.noise[at], 0.0f); };
+    const auto of_direct = [&](std::size_t at) {
+        return of_paths ? 0.0f : contrast.edge[at] + std::max(contrast.noise[at], 0.0f);
+    };
     const auto of_mean = [](const PixelMean& mean, float one) {
         return mean.count() == 0 ? 0 : static_cast<double>(one) / mean.count();
     };

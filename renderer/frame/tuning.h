@@ -50,6 +50,10 @@ inline constexpr double kMinRaysOfPaths = 0.15;
 inline constexpr double kSunlightPart = 0.22;
 inline constexpr double kMinRaysForSunlight = 12, kMinSamplesForSunlight = 4;
 inline constexpr double kMinSeparate = 0.5;
+/// The same for emission in view, whose samples take one ray each: its fraction of the budget, and the samples of
+/// each pixel that must be expected to fit a time. cornell and the module of bench/peers.py.
+inline constexpr double kEmissionPart = 0.1;
+inline constexpr std::uint64_t kUniformSamplesBesideEmission = 2;
 
 /// Time reserved for waking the threads and for a preempted one: the larger of kMinSlack_ns and 1/kSlackPart of the
 /// budget. Runs of docking on two cores beside other load.

@@ -13,6 +13,7 @@ const SunDirectLighting kSunDirectLighting;
 const DirectLighting kDirectLighting;
 const PathIntegrator kPathIntegrator;
 const SunPathIntegrator kSunPathIntegrator;
+const EmissionPathIntegrator kEmissionPathIntegrator;
 
 const Integrator& direct_lighting(const RenderScene& render_scene, bool) {
     if (SunDirectLighting::suffices(render_scene)) return kSunDirectLighting;
@@ -21,6 +22,7 @@ const Integrator& direct_lighting(const RenderScene& render_scene, bool) {
 
 const Integrator& path_tracing(const RenderScene& render_scene, bool separate_sun) {
     if (separate_sun && SunPathIntegrator::suffices(render_scene)) return kSunPathIntegrator;
+    if (separate_sun && EmissionPathIntegrator::suffices(render_scene)) return kEmissionPathIntegrator;
     return kPathIntegrator;
 }
 

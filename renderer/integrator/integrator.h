@@ -39,7 +39,7 @@ enum class LightParts : std::uint8_t { direct, path, both };
 /// Radiance of a batch in two parts, for which a pixel may take different numbers of samples. Only the integrator's
 /// parts are set.
 struct BatchRadiance {
-    RgbLanes direct;  ///< sunlight at first hits, and light that needs no path
+    RgbLanes direct;  ///< light that needs no path, which may include sunlight at first hits
     RgbLanes path;    ///< all else
 
     [[nodiscard]] Rgb total(LightParts parts, std::size_t i) const noexcept {
@@ -56,6 +56,8 @@ class Integrator {
 public:
     virtual ~Integrator() = default;
     [[nodiscard]] virtual LightParts parts() const noexcept = 0;
+    /// Light in two parts: only some of a pixel's samples need a path (paths_of).
+    [[nodiscard]] virtual bool thins_paths() const noexcept { return false; }
     /// Radiance along all rays of one batch, each on its own.
     virtual void radiance(const Transport& t, TracedRays& batch, RgbLanes& radiance) const noexcept = 0;
     /// Radiance of up to kMaxBatches batches, which hold up to kReuseGroup pixels, pixel by pixel with up to

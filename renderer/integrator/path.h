@@ -55,7 +55,8 @@ struct PathStart {
     std::size_t lane;
     /// PixelSampler(seed, frame, pixel), and the index in its sequence. The first four dimensions are the caller's.
     std::uint32_t pixel, sample;
-    bool sunlit = false;  ///< if lit(): the direct sunlight there is not zero
+    bool sunlit = false;          ///< if lit(): the direct sunlight there is not zero
+    bool emission_known = false;  ///< the light that the ray meets itself is known
 
     [[nodiscard]] bool lit() const noexcept { return surfaces != nullptr && is_set(surfaces->lanes, lane); }
 };

@@ -6,7 +6,9 @@
 #include <limits>
 #include <variant>
 
+#include "base/constants.h"
 #include "base/uninitialized_array.h"
+#include "renderer/integrator/shading.h"
 #include "renderer/integrator/sun_direct_lighting.h"
 
 namespace narpa {
@@ -41,7 +43,7 @@ struct SamplePlace {
 
 /// Traces one sample of each of some pixels, with path reuse.
 void trace_reused(const Transport& t, std::span<TracedRays> batches, std::span<const SamplePlace> places,
-                  std::span<BatchRadiance> light) {
+                  bool emission_known, std::span<BatchRadiance> light) {
     std::array<SamplePlace, kReuseGroup> from;
     std::array<PathStart, kReuseGroup> starts;
     std::array<Rgb, kReuseGroup> radiance;
@@ -56,7 +58,8 @@ void trace_reused(const Transport& t, std::span<TracedRays> batches, std::span<c
             if (is_set(p.complete, lane)) continue;
             from[n] = places[i];
             const bool sunlit = is_set(p.first.lanes, lane) && light[batch].direct[lane] != Rgb{};
-            starts[n++] = {&p.rays, &p.hits, &p.first, lane, p.number[lane], p.sample[lane], sunlit};
+            starts[n++] = {&p.rays,        &p.hits,        &p.first, lane,
+                           p.number[lane], p.sample[lane], sunlit,   emission_known};
         }
     const std::uint64_t rays = reused_path_radiance(t, std::span(starts).first(n), std::span(radiance).first(n),
                                                     std::span(variance).first(n));
@@ -70,7 +73,8 @@ void trace_reused(const Transport& t, std::span<TracedRays> batches, std::span<c
 
 /// The same for all samples: one sample of each pixel together, then the next of each, so that the samples of a
 /// pixel stay independent.
-void trace_all_reused(const Transport& t, std::span<TracedRays> batches, std::span<BatchRadiance> light) {
+void trace_all_reused(const Transport& t, std::span<TracedRays> batches, bool emission_known,
+                      std::span<BatchRadiance> light) {
     if (batches.empty()) return;
     PhaseClock clock(batches.front().times);
     for (std::size_t k = 0; k < batches.size(); ++k) {
@@ -89,7 +93,7 @@ void trace_all_reused(const Transport& t, std::span<TracedRays> batches, std::sp
             places[rank][n[rank]++] = {static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(i)};
         });
     for (std::size_t r = 0; r < kMaxPixelSamples && n[r] > 0; ++r)
-        trace_reused(t, batches, std::span(places[r]).first(n[r]), light);
+        trace_reused(t, batches, std::span(places[r]).first(n[r]), emission_known, light);
     clock.ends(Phase::indirect);
 }
 
@@ -105,6 +109,24 @@ Rgb escaped_radiance(const RenderScene& render_scene, const Vec3& direction) noe
     const std::optional<SunDisc>& sun = render_scene.lights().sun();
     if (!sun || sun->is_point() || sun->pdf(direction) == 0) return background;
     return background + Rgb{sun->radiance(), sun->radiance(), sun->radiance()};
+}
+
+/// Light that a camera ray meets itself, without a medium: of the surface, of lights before it, or of the
+/// background.
+Rgb met_emission(const Transport& t, const TracedRays& p, std::size_t i) noexcept {
+    const bool met = is_set(p.hits.met, i);
+    Rgb sum{};
+    if (const Lights& lights = t.render_scene.lights(); lights.any_with_extent()) {
+        const Receiver from{.anchor = p.rays.origin[i], .time = p.rays.time[i]};
+        sum = lights.radiance_before(met ? p.hits.range_m[i] : kInfinity, t.at, from, Lights::Group::all,
+                                     p.rays.direction[i], kInfinity, nullptr);
+    }
+    if (!met) return sum + escaped_radiance(t.render_scene, p.rays.direction[i]);
+    const Material& m = t.render_scene.scene().materials[static_cast<std::size_t>(p.hits.material[i])];
+    if (m.emission == Rgb{}) return sum;
+    if (!has_emission_map(m)) return sum + m.emission;
+    const double width_m = t.path.pixel_angle_rad * p.hits.range_m[i];
+    return sum + surface_at(t.render_scene.tracer(), t.at, p.hits[i], p.rays.direction[i], width_m).emission;
 }
 
 }  // namespace
@@ -130,7 +152,7 @@ void PathIntegrator::radiance(const Transport& t, std::span<TracedRays> batches,
                               std::span<BatchRadiance> light) const noexcept {
     assert(!t.path.direct && batches.size() <= kMaxBatches && batches.size() <= light.size());
     for (TracedRays& p : batches) p.first.lanes = p.complete = 0;
-    trace_all_reused(t, batches, light);
+    trace_all_reused(t, batches, false, light);
 }
 
 bool SunPathIntegrator::suffices(const RenderScene& render_scene) noexcept {
@@ -159,7 +181,24 @@ void SunPathIntegrator::radiance(const Transport& t, std::span<TracedRays> batch
             light[k].direct.put(i, escaped_radiance(t.render_scene, p.rays.direction[i]));
         });
     }
-    trace_all_reused(t, batches, light);
+    trace_all_reused(t, batches, false, light);
+}
+
+bool EmissionPathIntegrator::suffices(const RenderScene& render_scene) noexcept {
+    return render_scene.lights().any_visible() && render_scene.medium() == nullptr;
+}
+
+void EmissionPathIntegrator::radiance(const Transport& t, std::span<TracedRays> batches,
+                                      std::span<BatchRadiance> light) const noexcept {
+    assert(!t.path.direct && batches.size() <= kMaxBatches && batches.size() <= light.size());
+    for (std::size_t k = 0; k < batches.size(); ++k) {
+        TracedRays& p = batches[k];
+        p.lit = p.first.lanes = 0;
+        p.complete = ~p.hits.met;
+        light[k].direct.fill({});
+        for_each_lane(lanes_below(p.rays.n), [&](std::size_t i) { light[k].direct.put(i, met_emission(t, p, i)); });
+    }
+    trace_all_reused(t, batches, true, light);
 }
 
 }  // namespace narpa

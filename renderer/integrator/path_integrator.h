@@ -33,6 +33,21 @@ public:
 
     using PathIntegrator::radiance;
     [[nodiscard]] LightParts parts() const noexcept override { return LightParts::both; }
+    [[nodiscard]] bool thins_paths() const noexcept override { return true; }
+    void radiance(const Transport& t, std::span<TracedRays> batches,
+                  std::span<BatchRadiance> light) const noexcept override;
+};
+
+/// Method "path" where lamps may be in view: the direct part is the light that camera rays meet themselves, of
+/// emissive surfaces, lights and the background. A lamp is often a hundred times brighter than what it lights, so
+/// its outline causes most of the error, and a sample of it costs one ray.
+class EmissionPathIntegrator final : public PathIntegrator {
+public:
+    /// True if something else than the Sun and the background can be seen shining, and there is no medium.
+    [[nodiscard]] static bool suffices(const RenderScene& render_scene) noexcept;
+
+    using PathIntegrator::radiance;
+    [[nodiscard]] LightParts parts() const noexcept override { return LightParts::both; }
     void radiance(const Transport& t, std::span<TracedRays> batches,
                   std::span<BatchRadiance> light) const noexcept override;
 };

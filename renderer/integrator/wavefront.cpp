@@ -121,17 +121,18 @@ void Wavefront::arrive(int vertex) {
         Path& path = paths_[i];
         const bool is_escaped = hits_[i].body < 0;
         const double range_m = is_escaped ? kInfinity : hits_[i].range_m;
-        if (lights_.any_with_extent())
+        const bool known = vertex == 0 && starts_[path.ray].emission_known;
+        if (lights_.any_with_extent() && !known)
             add(path, lights_.radiance_before(range_m, at_, path.start, group_, directions_[i], path.direction_pdf,
                                               medium_));
         if (in_medium) {
             add(path, segments_[i].in_scattering);
             path.throughput = path.throughput * segments_[i].transmittance;
         }
-        if (is_escaped) add(path, escaped(path, directions_[i], vertex));
+        if (is_escaped && !known) add(path, escaped(path, directions_[i], vertex));
         if (is_escaped || (vertex > 0 && settings_.direct)) continue;
         keep(i, kept);
-        shade(kept++);
+        shade(kept++, !known);
     }
     n_ = kept;
 }
@@ -162,8 +163,8 @@ Rgb Wavefront::escaped(const Path& path, const Vec3& direction, int vertex) cons
     return radiance + Rgb{sunlight, sunlight, sunlight};
 }
 
-/// Makes the vertex at the hit, and adds its emission.
-void Wavefront::shade(std::size_t i) {
+/// Makes the vertex at the hit, and adds its emission if that counts.
+void Wavefront::shade(std::size_t i, bool emission_counts) {
     Path& path = paths_[i];
     const Hit& hit = hits_[i];
     path.length_m += hit.range_m;
@@ -172,7 +173,7 @@ void Wavefront::shade(std::size_t i) {
         return PathVertex(tracer_, at_, hit, directions_[i], width_m, !settings_.direct);
     });
     const Surface& surface = vertices_[i].surface();
-    if (surface.emission != Rgb{} && !path.lit) {
+    if (surface.emission != Rgb{} && !path.lit && emission_counts) {
         const double light_pdf =
             path.direction_pdf == kInfinity ? 0 : lights_.pdf(at_, path.start, group_, directions_[i], hit);
         add(path, surface.emission * static_cast<float>(power_heuristic(path.direction_pdf, light_pdf)));

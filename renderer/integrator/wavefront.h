@@ -58,7 +58,7 @@ private:
     void extend();
     void arrive(int vertex);
     void find_segments(int vertex);
-    void shade(std::size_t i);
+    void shade(std::size_t i, bool emission_counts);
     [[nodiscard]] Rgb ambient(std::size_t i) const;
     [[nodiscard]] Rgb escaped(const Path& path, const Vec3& direction, int vertex) const;
 

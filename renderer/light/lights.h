@@ -56,6 +56,8 @@ public:
 
     /// True if a ray can hit a light.
     [[nodiscard]] bool any_with_extent() const noexcept { return any_with_extent_; }
+    /// True if a camera ray can meet an emitter other than the Sun.
+    [[nodiscard]] bool any_visible() const noexcept { return any_with_extent_ || emitters_.size() > lights_; }
     [[nodiscard]] const std::optional<SunDisc>& sun() const noexcept { return sun_; }
 
     /// Emitters besides the Sun to include. Emissive surfaces light nothing in method "direct".

@@ -221,6 +221,64 @@ TEST(BudgetError, FramesWithSamplesOfSunlightAloneHaveTheMeanOfTheReference) {
     EXPECT_LT(std::abs(bias.mean()), 4 * 1.12 * bias.sigma());
 }
 
+/// A room whose lamps, in view, are a hundred times brighter than its walls.
+BudgetView lamps_in_a_room() {
+    Scene s;
+    s.materials.push_back(lambert(0.7f));
+    Material lamp = lambert(0.2f);
+    lamp.emission = {60, 55, 50};
+    s.materials.push_back(lamp);
+    add_mesh(s, plate(8, 8));                                                       // floor
+    add_mesh(s, plate(8, 8), {exp_rotation({3.14159265358979, 0, 0}), {0, 0, 4}});  // ceiling
+    add_mesh(s, plate(8, 4), {exp_rotation({1.5707963267949, 0, 0}), {0, 4, 2}});   // wall ahead
+    add_mesh(s, box(1.2, 1.2, 2.4), {normalized(Quat{1, 0, 0, 0.3}), {-1.3, 1.5, 1.2}});
+    add_mesh(s, box(0.1, 0.1, 3.5), {Quat{}, {0.6, 0.5, 1.9}});
+    for (int k = 0; k < 6; ++k) {
+        Mesh panel = plate(0.35, 0.2);
+        panel.face_material.assign(panel.faces.size(), 1);
+        add_mesh(s, std::move(panel),
+                 {exp_rotation({2.2, 0, 0.1 * k}), {1.1 * (k % 3) - 1.2, 1.0 + 1.3 * (k / 3), 3.6 - 0.1 * k}});
+    }
+    return {std::move(s), 56, 40, 50, looking({0.2, -3.5, 1.8}, {0, 1, 1.8})};
+}
+
+TEST(BudgetError, FallsAsTheBudgetGrowsWhereLampsAreInView) {
+    const BudgetView v = lamps_in_a_room();
+    const std::vector<double> truth = truth_of(v, 1024, Method::path);
+    const double rays_of_sample =
+        static_cast<double>(render(v, samples_a_pixel(v, 8, 0, Method::path)).account.rays) /
+        static_cast<double>(8 * v.pixels());
+    double before = 1e9;
+    int with_emission = 0;
+    for (const double rays : {2.0, 4.0, 8.0, 16.0, 32.0, 64.0}) {
+        SCOPED_TRACE(rays);
+        const FrameSettings settings = rays_a_pixel(v, rays, 0, Method::path);
+        const FrameAccount account = render(v, settings).account;
+        const Errors e = errors_of(v, truth, settings, 6);
+        EXPECT_LT(e.measured, before);
+        before = e.measured;
+        if (account.passes[kSunlightPass] == 0) continue;
+        ++with_emission;
+        expect_honest(e);
+        const int spp = static_cast<int>(rays / rays_of_sample);
+        EXPECT_LT(e.measured, 0.5 * errors_of(v, truth, samples_a_pixel(v, spp, 0, Method::path), 6).measured);
+    }
+    EXPECT_GE(with_emission, 2);
+}
+
+TEST(BudgetError, FramesWithSamplesOfEmissionAloneHaveTheMeanOfTheReference) {
+    const BudgetView v = lamps_in_a_room();
+    const std::vector<double> truth = truth_of(v, 2048, Method::path);
+    CameraRenderer renderer(v.render_scene, v.camera);
+    Bias bias;
+    for (std::uint32_t k = 0; k < 80; ++k) {
+        const Shown shown = render(renderer, v, rays_a_pixel(v, 24, k, Method::path));
+        ASSERT_GT(shown.account.passes[kSunlightPass], 0u);
+        bias.add(misses_of(shown.image, truth).mean);
+    }
+    EXPECT_LT(std::abs(bias.mean()), 4 * 1.12 * bias.sigma());
+}
+
 TEST(BudgetError, FramesThatTheClockEndsHaveTheMeanOfTheReference) {
     const BudgetView v = slatted_court();
     const std::vector<double> truth = truth_of(v, 512, Method::path);

@@ -49,5 +49,23 @@ TEST(IntegratorKinds, SunlightIsComputedDirectlyWhereTheSunIsTheOnlyLight) {
     EXPECT_EQ(parts(s, Method::path), LightParts::path);
 }
 
+TEST(IntegratorKinds, EmissionThatCameraRaysCanMeetIsSeparate) {
+    Scene s = plate_in_the_sun();
+    Light& lamp = s.lights.emplace_back();
+    lamp.emission = {1, 1, 1};
+    lamp.kind = Light::Kind::point;
+    EXPECT_EQ(parts(s, Method::path), LightParts::path);
+    lamp.kind = Light::Kind::disc;
+    lamp.radius_m = 0.1;
+    EXPECT_EQ(parts(s, Method::path), LightParts::both);
+    EXPECT_EQ(parts(s, Method::path, false), LightParts::path);
+    EXPECT_EQ(parts(s, Method::direct), LightParts::path);
+    s.lights.clear();
+    EXPECT_EQ(parts(s, Method::path), LightParts::both);  // sunlight
+    s.materials[0].emission = {1, 1, 1};
+    EXPECT_EQ(parts(s, Method::path), LightParts::both);
+    EXPECT_EQ(parts(s, Method::direct), LightParts::direct);
+}
+
 }  // namespace
 }  // namespace narpa

@@ -266,6 +266,25 @@ TEST(BudgetError, FallsAsTheBudgetGrowsWhereLampsAreInView) {
     EXPECT_GE(with_emission, 2);
 }
 
+TEST(BudgetError, FramesWhereLampsAreInViewAreTheSameOnAnyThreadsAndFromTheirAccount) {
+    const BudgetView v = lamps_in_a_room();
+    int with_emission = 0;
+    for (const double rays : {1.0, 3.0, 8.0, 16.0, 20.0, 29.0, 64.0}) {
+        SCOPED_TRACE(rays);
+        const FrameSettings s = rays_a_pixel(v, rays, 3, Method::path);
+        const Shown shown = render(v, s);
+        EXPECT_LE(shown.account.rays + shown.account.rays_discarded, s.budget.rays);
+        const Shown alone = tbb::task_arena(1).execute([&] { return render(v, s); });
+        EXPECT_TRUE(same_bytes(shown.image, alone.image));
+        EXPECT_EQ(shown.account.standard_error, alone.account.standard_error);
+        const Shown again = render(v, replay_of(s, shown.account));
+        EXPECT_TRUE(same_bytes(shown.image, again.image));
+        EXPECT_EQ(again.account.passes, shown.account.passes);
+        if (shown.account.passes[kSunlightPass] > 0) ++with_emission;
+    }
+    EXPECT_GE(with_emission, 2);
+}
+
 TEST(BudgetError, FramesWithSamplesOfEmissionAloneHaveTheMeanOfTheReference) {
     const BudgetView v = lamps_in_a_room();
     const std::vector<double> truth = truth_of(v, 2048, Method::path);

@@ -219,14 +219,16 @@ def await_ledger(bus, wire, frame, seconds=30):
     expect(False, f"the ledger of frame {frame} arrives within {seconds} s")
 
 
-def command_frames(run, port, poses):
-    """Commands a run in lockstep over slcan at `port`, one pose for each frame; returns when it has made the last one."""
+def command_frames(run, port, poses, pause_s=0):
+    """Commands a run in lockstep over slcan at `port`, one pose for each frame, and pauses after each; returns when it has made the
+    last one."""
     wire = Wire()
     bus = open_bus(run, interface="slcan", channel=f"socket://127.0.0.1:{port}", sleep_after_open=0.1)
     for frame, pose in enumerate(poses):
         for message in wire.command(pose, frame * PERIOD_NS, counter=frame):
             bus.send(message)
         await_ledger(bus, wire, frame)
+        time.sleep(pause_s)
     bus.shutdown()
 
 

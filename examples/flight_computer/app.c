@@ -358,7 +358,7 @@ static void print_summary(void) {
 int app_run(const struct app_options *options) {
     app.decoder.ledger_camera = mission.camera.index;
     int status = frame_input_open(options->video, &mission.camera);
-    if (status == 0) status = can_bus_open(&app.bus, options->can, kBusPatience_s);
+    if (status == 0) status = can_bus_open(&app.bus, options->can, kBusPatience_s, options->stop);
     if (status != 0) return status;
     const struct status open = {.has_bus = true}, reports = {.has_bus = true, .has_reports = true};
     machine_step(&app.machine, &open);

@@ -8,7 +8,7 @@
 #include "events.h"
 #include "exit_status.h"
 
-int can_bus_open(struct can_bus *bus, const char *name, double patience_s) {
+int can_bus_open(struct can_bus *bus, const char *name, double patience_s, const volatile sig_atomic_t *stop) {
     char host[256] = "";
     const char *port = NULL;
     memset(bus, 0, sizeof *bus);
@@ -27,13 +27,16 @@ int can_bus_open(struct can_bus *bus, const char *name, double patience_s) {
         return EXIT_BAD_INPUT;
     }
     const int64_t until_ns = monotonic_ns() + (int64_t)(patience_s * 1e9);
+    bool said = false;
     for (;;) {
         const char *trouble = bus->is_slcan ? slcan_open(bus, host, port) : socketcan_open(bus, name);
         if (trouble == NULL) return 0;
-        if (monotonic_ns() > until_ns) {
-            event(EVENT_ERROR, "--can %s: %s (tried for %g s)", name, trouble, patience_s);
+        if (*stop || monotonic_ns() > until_ns) {
+            event(EVENT_ERROR, "--can %s: %s", name, trouble);
             return EXIT_NO_DEVICE;
         }
+        if (!said) event(EVENT_INFO, "--can %s: %s; tries again for %g s", name, trouble, patience_s);
+        said = true;
         nanosleep(&(struct timespec){.tv_nsec = 100000000}, NULL);
     }
 }

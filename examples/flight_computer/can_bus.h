@@ -3,6 +3,7 @@
 #ifndef CAN_BUS_H
 #define CAN_BUS_H
 
+#include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -24,7 +25,7 @@ struct can_bus {
 
 /* `name`: an interface of SocketCAN such as can0, or slcan:HOST:PORT. Retries for `patience_s` while there is no such
  * bus yet. On failure prints the reason and returns an exit status, else 0. */
-int can_bus_open(struct can_bus *bus, const char *name, double patience_s);
+int can_bus_open(struct can_bus *bus, const char *name, double patience_s, const volatile sig_atomic_t *stop);
 
 enum can_result { CAN_FRAME, CAN_NOTHING, CAN_CLOSED };
 enum can_result can_bus_receive(struct can_bus *bus, struct can_frame_bytes *frame); /* does not wait */

@@ -13,7 +13,7 @@ static const char usage[] =
     "usage: flight_computer [--can BUS] [--video SOURCE]\n"
     "       flight_computer --messages\n"
     "\n"
-    "  --can BUS       can0 (SocketCAN), or slcan:HOST:PORT; default: $BUS\n"
+    "  --can BUS       can0 (SocketCAN), or slcan:[HOST:]PORT; default: $BUS\n"
     "  --video SOURCE  udp:PORT, /dev/videoN or a FIFO of Y4M; default: $VIDEO, also as CAMERA=SOURCE\n"
     "  --messages      prints the tables of CAN messages and ends\n"
     "\n"

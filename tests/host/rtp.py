@@ -195,7 +195,7 @@ def check(pixel_format, poses, loses=False):
             time.sleep(0.1)
         expect(all(listens(port) for port in ports.values()), f"{pixel_format}: {', '.join(names)} listen")
         time.sleep(3)  # a reader has its port before it reads
-        support.command_frames(run, can_port, poses, pause_s=1 / RATE_HZ)  # the readers share the processors with narpa
+        support.command_frames(run, can_port, poses, pause_s=1.5)  # the readers share the processors with narpa
         print(run.stop()["cameras"][0]["sinks"])
     wanted = [pixels_rendered(pixel_format, support.render(scene, frame, pose, folder)) for frame, pose in enumerate(poses)]
     for _ in range(300):  # what is still on the way

@@ -99,7 +99,8 @@ void read_can_pose(TableReader& body_table, Body& body, SceneReading& reading) {
     if (!body.can_id)
         body_table.fail("can_pose", "the body has no can_id, by which narpa's own messages name it: expected one");
     const auto file = table->text("dbc");
-    const auto all = file ? read_dbc_file((reading.folder / *file).string()) : std::vector<DbcMessage>{};
+    if (!file) return table->finish();  // its absence has been noted
+    const auto all = read_dbc_file((reading.folder / *file).string());
     if (!all) {
         reading.problems.add(table->place("dbc"), all.error());
         return table->finish();

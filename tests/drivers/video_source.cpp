@@ -199,7 +199,7 @@ TEST(VideoSource, BadSourcesSayWhatIsWrong) {
         std::string says;
     } cases[] = {
         {"", kGreySource, ErrorKind::bad_input,
-         "expected /dev/videoN, bridge:PORT, udp:PORT, FILE.y4m, or an existing FIFO"},
+         "expected /dev/videoN, bridge:PORT, udp:PORT, rtp:PORT, FILE.y4m, or an existing FIFO"},
         {folder / "frames.bin", kGreySource, ErrorKind::bad_input, "expected /dev/videoN"},
         {folder / "fifo", kGreySource, ErrorKind::missing, "try: mkfifo " + (folder / "fifo")},
         {folder / "colour.y4m",

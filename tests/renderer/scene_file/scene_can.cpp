@@ -62,7 +62,7 @@ TEST_F(SceneOnCan, RefusesSignalsThatAreNotThere) {
         std::string text = kPose;
         return read(text.replace(text.find(from), from.size(), to));
     };
-    expect_error(with("POS.X", "POX.X"), "scene.toml:13:12: \"POX.X\": expected MESSAGE.SIGNAL");
+    expect_error(with("POS.X", "POX.X"), "scene.toml:13:12: position: \"POX.X\": expected MESSAGE.SIGNAL");
     expect_error(with("POS.X", "POSX"), "expected MESSAGE.SIGNAL");
     expect_error(with("POS.X", "POS.W"), "the message has no such signal, expected one of X, Y, Z");
     expect_error(with("\"POS.X\", ", ""), "has 2 signals, expected 3");

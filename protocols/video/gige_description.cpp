@@ -74,7 +74,7 @@ std::string gige_description(const VideoFormat& format, const GigePixelFormat& p
     const auto [end, _] =
         std::to_chars(rate.data(), rate.data() + rate.size(), 1e9 / static_cast<double>(format.period_ns));
     // GigE Vision's own registers: maker, model, version, serial number.
-    constexpr std::uint32_t kMaker = 0x48, kModel = 0x68, kVersion = 0x88, kSerial = 0xD8;
+    constexpr std::uint32_t kMaker = 0x48, kModel = 0x68, kDeviceVersion = 0x88, kSerial = 0xD8;
     return "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
            "<RegisterDescription ModelName=\"camera\" VendorName=\"narpa\" StandardNameSpace=\"GEV\" "
            "SchemaMajorVersion=\"1\" SchemaMinorVersion=\"0\" SchemaSubMinorVersion=\"1\" MajorVersion=\"1\" "
@@ -84,7 +84,7 @@ std::string gige_description(const VideoFormat& format, const GigePixelFormat& p
                     {"DeviceControl", "ImageFormatControl", "AcquisitionControl", "TransportLayerControl"}) +
            category("DeviceControl", {"DeviceVendorName", "DeviceModelName", "DeviceVersion", "DeviceID"}) +
            text("DeviceVendorName", kMaker, 32) + text("DeviceModelName", kModel, 32) +
-           text("DeviceVersion", kVersion, 32) + text("DeviceID", kSerial, 16) +
+           text("DeviceVersion", kDeviceVersion, 32) + text("DeviceID", kSerial, 16) +
            category("ImageFormatControl",
                     {"SensorWidth", "SensorHeight", "OffsetX", "OffsetY", "Width", "Height", "PixelFormat"}) +
            integer("SensorWidth", at.sensor_width, "RO") + integer("SensorHeight", at.sensor_height, "RO") +

@@ -25,7 +25,7 @@ namespace narpa {
 
 namespace {
 
-/// How often Aravis looks whether there is a frame.
+/// Period with which Aravis polls for a frame.
 constexpr double kLooks_hz = 1000;
 constexpr std::chrono::milliseconds kGiveUpPeriod{20};
 /// GigE Vision's block numbers: 16 bits, 0 is none.

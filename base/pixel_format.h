@@ -30,17 +30,23 @@ enum class PixelFormat : std::uint8_t {
     bggr16,
 };
 
-/// How a link lays out samples of 16 bits; the samples themselves stay left-justified everywhere else.
+/// How a link lays out the rows of a frame; the samples themselves stay as they are everywhere else.
 struct LinkLayout {
     enum class Kind : std::uint8_t {
         samples,  ///< as they are; the only one of samples that do not have 16 bits
-        right,    ///< right-justified in 16 bits, little-endian
+        right,    ///< right-justified in 16 bits
         mipi,     ///< MIPI CSI-2 RAW10 and RAW12: the high bytes of 4 or 2 pixels, then a byte of their low bits
+        genicam,  ///< GenICam's Mono10p and Mono12p: the bits of one pixel after another, lowest first
     };
     Kind kind = Kind::samples;
     std::uint8_t bits = 16;              ///< of a pixel: the ADC's
     std::uint16_t first_bytes_kept = 0;  ///< of the last row: an embedded line, which is not laid out
-    [[nodiscard]] bool is_samples() const { return kind == Kind::samples; }
+    bool big_endian = false;             ///< of elements of 16 bits
+    std::uint32_t row_bytes = 0;         ///< with padding, which is 0; 0: none
+    [[nodiscard]] bool is_samples() const { return kind == Kind::samples && has_plain_rows(); }
+    /// Little-endian without padding, as protocols expect that cannot tell.
+    [[nodiscard]] constexpr bool has_plain_rows() const { return !big_endian && row_bytes == 0; }
+    [[nodiscard]] constexpr bool is_packed() const { return kind == Kind::mipi || kind == Kind::genicam; }
     friend bool operator==(const LinkLayout&, const LinkLayout&) = default;
 };
 
@@ -95,30 +101,57 @@ inline constexpr auto kPixelFormatNames = [] {
     return row_of(f).name;
 }
 
-/// A format of a link: samples of a format of 16 bits, laid out. Names and codes are V4L2's.
+/// A format of a link: samples of a format of 16 bits, laid out. Names and codes are V4L2's, or names are those of
+/// GenICam's Pixel Format Naming Convention, which V4L2 has no codes for.
 struct LinkFormatRow {
     std::string_view name;
     PixelFormat samples;
     LinkLayout layout;
-    std::string_view v4l2;
+    std::string_view v4l2{};
     std::string_view y4m{};
 };
 inline constexpr auto kLinkFormats = [] {
     using Kind = LinkLayout::Kind;
     constexpr LinkLayout r10{Kind::right, 10}, r12{Kind::right, 12}, r14{Kind::right, 14}, p10{Kind::mipi, 10},
-        p12{Kind::mipi, 12};
+        p12{Kind::mipi, 12}, g10{Kind::genicam, 10}, g12{Kind::genicam, 12};
     constexpr PixelFormat y = PixelFormat::y16, rg = PixelFormat::rggb16, gr = PixelFormat::grbg16,
                           gb = PixelFormat::gbrg16, bg = PixelFormat::bggr16;
     return std::to_array<LinkFormatRow>({
-        {"Y10", y, r10, "Y10 ", "mono10"}, {"Y12", y, r12, "Y12 ", "mono12"}, {"Y14", y, r14, "Y14 "},
-        {"Y10P", y, p10, "Y10P"},          {"Y12P", y, p12, "Y12P"},          {"RGGB10", rg, r10, "RG10"},
-        {"RGGB12", rg, r12, "RG12"},       {"RGGB14", rg, r14, "RG14"},       {"RGGB10P", rg, p10, "pRAA"},
-        {"RGGB12P", rg, p12, "pRCC"},      {"GRBG10", gr, r10, "BA10"},       {"GRBG12", gr, r12, "BA12"},
-        {"GRBG14", gr, r14, "GR14"},       {"GRBG10P", gr, p10, "pgAA"},      {"GRBG12P", gr, p12, "pgCC"},
-        {"GBRG10", gb, r10, "GB10"},       {"GBRG12", gb, r12, "GB12"},       {"GBRG14", gb, r14, "GB14"},
-        {"GBRG10P", gb, p10, "pGAA"},      {"GBRG12P", gb, p12, "pGCC"},      {"BGGR10", bg, r10, "BG10"},
-        {"BGGR12", bg, r12, "BG12"},       {"BGGR14", bg, r14, "BG14"},       {"BGGR10P", bg, p10, "pBAA"},
+        {"Y10", y, r10, "Y10 ", "mono10"},
+        {"Y12", y, r12, "Y12 ", "mono12"},
+        {"Y14", y, r14, "Y14 "},
+        {"Y10P", y, p10, "Y10P"},
+        {"Y12P", y, p12, "Y12P"},
+        {"RGGB10", rg, r10, "RG10"},
+        {"RGGB12", rg, r12, "RG12"},
+        {"RGGB14", rg, r14, "RG14"},
+        {"RGGB10P", rg, p10, "pRAA"},
+        {"RGGB12P", rg, p12, "pRCC"},
+        {"GRBG10", gr, r10, "BA10"},
+        {"GRBG12", gr, r12, "BA12"},
+        {"GRBG14", gr, r14, "GR14"},
+        {"GRBG10P", gr, p10, "pgAA"},
+        {"GRBG12P", gr, p12, "pgCC"},
+        {"GBRG10", gb, r10, "GB10"},
+        {"GBRG12", gb, r12, "GB12"},
+        {"GBRG14", gb, r14, "GB14"},
+        {"GBRG10P", gb, p10, "pGAA"},
+        {"GBRG12P", gb, p12, "pGCC"},
+        {"BGGR10", bg, r10, "BG10"},
+        {"BGGR12", bg, r12, "BG12"},
+        {"BGGR14", bg, r14, "BG14"},
+        {"BGGR10P", bg, p10, "pBAA"},
         {"BGGR12P", bg, p12, "pBCC"},
+        {"Mono10p", y, g10},
+        {"Mono12p", y, g12},
+        {"BayerRG10p", rg, g10},
+        {"BayerRG12p", rg, g12},
+        {"BayerGR10p", gr, g10},
+        {"BayerGR12p", gr, g12},
+        {"BayerGB10p", gb, g10},
+        {"BayerGB12p", gb, g12},
+        {"BayerBG10p", bg, g10},
+        {"BayerBG12p", bg, g12},
     });
 }();
 /// All names that a camera's `format` may have: those of samples, then those of links.
@@ -134,16 +167,28 @@ inline constexpr auto kCameraFormatNames = [] {
         if (row.samples == samples && row.layout.kind == layout.kind && row.layout.bits == layout.bits) return &row;
     return nullptr;
 }
-/// Name, V4L2's code and Y4M's colour space of what a link carries.
+/// The name of what a link carries, without byte order and padding.
 [[nodiscard]] constexpr std::string_view link_name(PixelFormat samples, const LinkLayout& layout) {
     const LinkFormatRow* row = link_format_of(samples, layout);
     return row != nullptr ? row->name : name(samples);
 }
-[[nodiscard]] constexpr std::string_view link_code(PixelFormat samples, const LinkLayout& layout) {
-    const LinkFormatRow* row = link_format_of(samples, layout);
-    return row != nullptr ? row->v4l2 : row_of(samples).v4l2;
+/// With them: "Y12-BE with rows of 1312 bytes".
+[[nodiscard]] inline std::string link_text(PixelFormat samples, const LinkLayout& layout) {
+    return std::string(link_name(samples, layout)) + (layout.big_endian ? "-BE" : "") +
+           (layout.row_bytes != 0 ? " with rows of " + std::to_string(layout.row_bytes) + " bytes" : "");
 }
+/// V4L2 marks big-endian formats in its codes (v4l2_fourcc_be): this bit of the last character.
+inline constexpr std::uint8_t kBigEndianMark = 0x80;
+/// V4L2's code of what a link carries, four characters; empty: it has none.
+[[nodiscard]] inline std::string link_code(PixelFormat samples, const LinkLayout& layout) {
+    const LinkFormatRow* row = link_format_of(samples, layout);
+    std::string code(row != nullptr ? row->v4l2 : row_of(samples).v4l2);
+    if (layout.big_endian && !code.empty()) code.back() = static_cast<char>(code.back() | kBigEndianMark);
+    return code;
+}
+/// Y4M's colour space of what a link carries; empty: it has none.
 [[nodiscard]] constexpr std::string_view link_y4m(PixelFormat samples, const LinkLayout& layout) {
+    if (!layout.has_plain_rows()) return {};
     const LinkFormatRow* row = link_format_of(samples, layout);
     return row != nullptr ? row->y4m : row_of(samples).y4m;
 }
@@ -152,11 +197,18 @@ struct LinkPixels {
     LinkLayout layout{};
 };
 /// What V4L2's code stands for.
-[[nodiscard]] constexpr std::optional<LinkPixels> link_from_code(std::string_view code) {
+[[nodiscard]] inline std::optional<LinkPixels> link_from_code(std::string code) {
+    if (code.empty()) return std::nullopt;
+    const bool big_endian = (static_cast<std::uint8_t>(code.back()) & kBigEndianMark) != 0;
+    code.back() = static_cast<char>(code.back() & ~kBigEndianMark);
+    std::optional<LinkPixels> found;
     for (const LinkFormatRow& row : kLinkFormats)
-        if (row.v4l2 == code) return LinkPixels{row.samples, row.layout};
-    if (const auto samples = pixel_format_from(code, &PixelFormatRow::v4l2)) return LinkPixels{*samples, {}};
-    return std::nullopt;
+        if (row.v4l2 == code) found = LinkPixels{row.samples, row.layout};
+    if (const auto samples = pixel_format_from(code, &PixelFormatRow::v4l2)) found = LinkPixels{*samples, {}};
+    if (!found || !big_endian) return found;
+    if (!row_of(found->samples).is_16_bit || found->layout.is_packed()) return std::nullopt;
+    found->layout.big_endian = true;
+    return found;
 }
 
 [[nodiscard]] constexpr bool is_bayer(PixelFormat f) {
@@ -177,10 +229,15 @@ struct LinkPixels {
 [[nodiscard]] constexpr std::size_t frame_bytes(const VideoFormat& f) {
     return static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) * bytes_per_pixel(f.pixel);
 }
-/// Of a row on the link, and of a frame. Packed pixels come in groups of whole bytes (unfit_width).
+/// Of a row on the link without its padding, with it, and of a frame. Packed pixels come in groups of whole bytes
+/// (unfit_layout).
+[[nodiscard]] constexpr std::size_t link_pixel_bytes(std::size_t width, PixelFormat samples,
+                                                     const LinkLayout& layout) {
+    return layout.is_packed() ? width * layout.bits / 8 : width * bytes_per_pixel(samples);
+}
 [[nodiscard]] constexpr std::size_t link_row_bytes(std::size_t width, PixelFormat samples,
                                                    const LinkLayout& layout) {
-    return layout.kind == LinkLayout::Kind::mipi ? width * layout.bits / 8 : width * bytes_per_pixel(samples);
+    return layout.row_bytes != 0 ? layout.row_bytes : link_pixel_bytes(width, samples, layout);
 }
 [[nodiscard]] constexpr std::size_t link_row_bytes(const VideoFormat& f) {
     return link_row_bytes(static_cast<std::size_t>(f.width), f.pixel, f.link);
@@ -204,13 +261,35 @@ struct LinkPixels {
     if (is_bayer(f) && height % 2 != 0) return text("height", height);
     return {};
 }
-/// Why a row of this width cannot be laid out, or an empty text.
-[[nodiscard]] inline std::string unfit_width(PixelFormat f, const LinkLayout& layout, int width) {
-    const int group = layout.kind != LinkLayout::Kind::mipi ? 1 : layout.bits == 10 ? 4 : 2;
-    if (width % group == 0) return {};
-    return std::string(link_name(f, layout)) + " holds " + std::to_string(group) +
-           " pixels together, expected a width that is a multiple of " + std::to_string(group) + ", not " +
-           std::to_string(width);
+/// The longest row of a link, with its padding.
+inline constexpr std::uint32_t kLinkRowBytesMost = 1 << 20;
+/// Why rows of this width cannot be laid out, or an empty text.
+[[nodiscard]] inline std::string unfit_layout(PixelFormat f, const LinkLayout& layout, int width) {
+    const int group = !layout.is_packed() ? 1 : layout.bits == 10 ? 4 : 2;
+    if (width % group != 0)
+        return std::string(link_name(f, layout)) + " holds " + std::to_string(group) +
+               " pixels together, expected a width that is a multiple of " + std::to_string(group) + ", not " +
+               std::to_string(width);
+    if (layout.big_endian && (!is_16_bit(f) || layout.is_packed()))
+        return std::string(link_name(f, layout)) +
+               " has no byte order, expected a format of 16 bits for a big-endian one";
+    const std::size_t least = link_pixel_bytes(static_cast<std::size_t>(width), f, layout);
+    if (layout.row_bytes != 0 && (layout.row_bytes < least || layout.row_bytes > kLinkRowBytesMost))
+        return "rows of " + std::to_string(layout.row_bytes) + " bytes, expected " + std::to_string(least) +
+               " (the pixels of a row) to " + std::to_string(kLinkRowBytesMost);
+    return {};
+}
+/// The rows that a header states; false: they are too short for the pixels, or too long.
+[[nodiscard]] inline bool take_row_bytes(std::uint32_t row_bytes, std::size_t width, PixelFormat samples,
+                                         LinkLayout& layout) {
+    const std::size_t least = link_pixel_bytes(width, samples, layout);
+    layout.row_bytes = row_bytes == least ? 0 : row_bytes;
+    return row_bytes >= least && (row_bytes == least || row_bytes <= kLinkRowBytesMost);
+}
+/// Of two formats of the same samples: the same bytes on the link.
+[[nodiscard]] inline bool is_same_on_link(const VideoFormat& a, const VideoFormat& b) {
+    return a.width == b.width && a.height == b.height && link_row_bytes(a) == link_row_bytes(b) &&
+           link_name(a.pixel, a.link) == link_name(b.pixel, b.link) && a.link.big_endian == b.link.big_endian;
 }
 
 }  // namespace narpa

@@ -81,22 +81,28 @@ Finding absent(const std::string& spec, const Error& e) {
     return {name, false, e.what.starts_with(spec + ": ") ? e.what.substr(spec.size() + 2) : e.what, e.remedy};
 }
 
-/// Tests a device as its kind says. `open`: as a run would.
-Result<Finding> test_device(const std::string& spec, const DeviceKind* kind, const auto& open) {
-    if (kind && kind->destination == Destination::new_file) {
-        const Status writable = check_writable(spec);
-        return writable ? Finding{spec, true, "can be written", ""} : absent(spec, writable.error());
-    }
+/// What was wrong, if not with what the user wrote.
+Result<Finding> finding_of(const std::string& spec, const Error& error) {
+    if (error.kind == ErrorKind::bad_input) return error;
+    return absent(spec, error);
+}
+Result<Finding> test_file(const std::string& spec, const Status& writable) {
+    return writable ? Finding{spec, true, "can be written", ""} : finding_of(spec, writable.error());
+}
+/// `open`: as a run would.
+Result<Finding> test_device(const std::string& spec, const auto& open) {
     const auto device = open();
-    if (device) return Finding{spec, true, (*device)->description(), ""};
-    if (device.error().kind == ErrorKind::bad_input) return device.error();
-    return absent(spec, device.error());
+    return device ? Finding{spec, true, (*device)->description(), ""} : finding_of(spec, device.error());
+}
+bool is_new_file(const DeviceKind* kind) {
+    return kind && kind->destination == Destination::new_file;
 }
 Result<Finding> test_bus(const std::string& spec) {
-    return test_device(spec, can_bus_kind(spec), [&] { return open_can_bus(spec, CanRole::hub); });
+    return test_device(spec, [&] { return open_can_bus(spec, CanRole::hub); });
 }
 Result<Finding> test_video(const std::string& spec, const VideoFormat& format) {
-    return test_device(spec, video_sink_kind(spec), [&] { return open_video_sink(spec, format, WhenFull::drop); });
+    if (is_new_file(video_sink_kind(spec))) return test_file(spec, check_video_file(spec, format));
+    return test_device(spec, [&] { return open_video_sink(spec, format, WhenFull::drop); });
 }
 Result<Finding> test_lidar(const std::string& spec, const Lidar& lidar, bool has_bus, const Scene& scene) {
     const DeviceKind* kind = packet_sink_kind(spec);
@@ -104,9 +110,9 @@ Result<Finding> test_lidar(const std::string& spec, const Lidar& lidar, bool has
         if (auto good = check_beams_on_can(lidar, has_bus, scene.file); !good) return good.error();
         return Finding{spec, true, "each shot of LiDAR " + lidar.name + " on the CAN bus", ""};
     }
-    return test_device(spec, kind, [&] {
-        return open_packet_sink(spec, lidar.model->spec().network, false, lidar.model->metadata());
-    });
+    if (is_new_file(kind)) return test_file(spec, check_writable(spec));
+    return test_device(
+        spec, [&] { return open_packet_sink(spec, lidar.model->spec().network, false, lidar.model->metadata()); });
 }
 
 /// A device without an option: the text alone shows what it is.

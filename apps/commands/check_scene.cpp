@@ -102,7 +102,7 @@ nlohmann::json describe_scene(const World& world) {
         cameras.push_back({{"name", c.name},
                            {"width", c.width},
                            {"height", c.height},
-                           {"format", std::string(link_name(c.format, c.link))},
+                           {"format", link_text(c.format, c.link)},
                            {"rate_hz", 1e9 / static_cast<double>(c.period_ns)},
                            {"detector", c.detector.has_value()},
                            {"lens", c.optics.lens.has_value()}});
@@ -139,7 +139,7 @@ void print_scene(const World& world) {
     print_light(s);
     for (const Camera& c : s.cameras)
         say(fmt::format("  camera {}: {} x {} {} at {:.6g} Hz{}", c.name, c.width, c.height,
-                        link_name(c.format, c.link), 1e9 / static_cast<double>(c.period_ns),
+                        link_text(c.format, c.link), 1e9 / static_cast<double>(c.period_ns),
                         c.optics.lens ? ", with a lens" : ""));
     if (s.stars) {
         say(fmt::format("  stars: {}", s.stars->stars.size()));

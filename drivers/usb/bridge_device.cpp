@@ -67,9 +67,9 @@ void BridgeDevice::conclude() noexcept {
     const auto bytes = std::span<const std::uint8_t>(slot.bytes);
     const auto header = decode_bulk_header(bytes.first(kBulkHeaderBytes));
     const bool is_good = filled_ == bytes.size() && header &&
-                         link_code(header->pixel, header->link) == link_code(format_.pixel, format_.link) &&
-                         std::cmp_equal(header->width, format_.width) &&
-                         std::cmp_equal(header->height, format_.height) &&
+                         is_same_on_link({static_cast<int>(header->width), static_cast<int>(header->height),
+                                          header->pixel, format_.period_ns, header->link},
+                                         format_) &&
                          header->pixels_crc32 == crc32(bytes.subspan(kBulkHeaderBytes));
     if (!is_good) return drop_partial();
     filled_ = 0;

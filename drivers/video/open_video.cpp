@@ -6,6 +6,7 @@
 
 #include "drivers/video/backends.h"
 #include "protocols/video/link_layout.h"
+#include "protocols/video/y4m.h"
 
 namespace narpa {
 namespace {
@@ -92,14 +93,17 @@ bool is_video_device(const std::string& text) {
 
 struct VideoSinkKind : DeviceKind {
     VideoSinkResult (*open)(const std::string& rest, const VideoSinkOptions& o);
+    bool by_code = false;  ///< it states V4L2's code of a format
 };
 constexpr std::array kVideoSinks{
     VideoSinkKind{{"", "/dev/videoN", "/dev/videoN (V4L2 output)", is_video_device, {}, Destination::device},
-                  open_v4l2_sink},
+                  open_v4l2_sink,
+                  true},
     VideoSinkKind{{"uvc:", "uvc:PORT", "uvc:[ADDRESS:]PORT (a USB camera over USB/IP)"}, open_uvc_sink},
     VideoSinkKind{
         {"bulk:", "bulk:[BRIDGE]", "bulk:[VENDOR:PRODUCT/][SERIAL|BUS-PORT] (a USB frame bridge: FPGA, FX3)"},
-        open_bulk_sink},
+        open_bulk_sink,
+        true},
     VideoSinkKind{{"tcp:", "tcp:PORT", "tcp:[ADDRESS:]PORT (Y4M to each client that connects)"}, open_tcp_sink},
     VideoSinkKind{{"udp:",
                    "udp:HOST:PORT",
@@ -107,7 +111,8 @@ constexpr std::array kVideoSinks{
                    {},
                    {},
                    Destination::port},
-                  open_udp_video_sink},
+                  open_udp_video_sink,
+                  true},
     VideoSinkKind{{"rtp:",
                    "rtp:HOST:PORT",
                    "rtp:HOST[%INTERFACE]:PORT[,sdp=FILE][,mtu=N][,mbit_s=N][,ttl=N] (RTP, RFC 4175)",
@@ -125,14 +130,18 @@ constexpr std::span<const VideoSinkKind> kVideoSinkTable{kVideoSinks};
 
 struct VideoSourceKind : DeviceKind {
     VideoSourceResult (*open)(const std::string& rest, const VideoFormat& format);
+    bool by_code = false;      ///< frames have V4L2's code of their format
     bool has_samples = false;  ///< frames of samples; else as the link lays them out
 };
 constexpr std::array kVideoSources{
-    VideoSourceKind{{"", "/dev/videoN", "/dev/videoN (V4L2 capture)", is_video_device}, open_v4l2_source},
+    VideoSourceKind{{"", "/dev/videoN", "/dev/videoN (V4L2 capture)", is_video_device}, open_v4l2_source, true},
     VideoSourceKind{{"bridge:", "bridge:PORT", "bridge:[ADDRESS:]PORT (a USB frame bridge in software)"},
-                    open_bridge_source},
-    VideoSourceKind{{"udp:", "udp:PORT", "udp:[ADDRESS[%INTERFACE]:]PORT (datagrams)"}, open_udp_video_source},
-    VideoSourceKind{{"rtp:", "rtp:PORT", "rtp:[ADDRESS[%INTERFACE]:]PORT (RTP, RFC 4175)"}, open_rtp_source, true},
+                    open_bridge_source,
+                    true},
+    VideoSourceKind{
+        {"udp:", "udp:PORT", "udp:[ADDRESS[%INTERFACE]:]PORT (datagrams)"}, open_udp_video_source, true},
+    VideoSourceKind{
+        {"rtp:", "rtp:PORT", "rtp:[ADDRESS[%INTERFACE]:]PORT (RTP, RFC 4175)"}, open_rtp_source, false, true},
     VideoSourceKind{{"", "FILE.y4m", "FILE.y4m (followed as it grows)", is_existing_y4m_file}, open_y4m_source},
     VideoSourceKind{{"", "an existing FIFO", "a FIFO (Y4M)", is_fifo}, open_y4m_source},
 };
@@ -160,7 +169,12 @@ private:
 
 std::string unfit(const VideoFormat& format) {
     const std::string what = unfit_size(format.pixel, format.width, format.height);
-    return what.empty() ? unfit_width(format.pixel, format.link, format.width) : what;
+    return what.empty() ? unfit_layout(format.pixel, format.link, format.width) : what;
+}
+
+std::string no_code(const VideoFormat& format) {
+    return "V4L2 has no code of " + link_text(format.pixel, format.link) +
+           "; expected another format of the camera in the scene, or gige:, which has one";
 }
 
 Error no_such_path(const std::string& spec) {
@@ -191,6 +205,10 @@ std::unique_ptr<VideoSink> queued_sink(std::unique_ptr<VideoWriter> writer, cons
 const DeviceKind* video_sink_kind(const std::string& spec) {
     return find_kind(kVideoSinkTable, spec);
 }
+Status check_video_file(const std::string& path, const VideoFormat& format) {
+    if (auto header = y4m_stream_header(format); !header) return Error{header.error().what, path};
+    return check_writable(path);
+}
 std::string video_sink_help() {
     return help_of(kVideoSinkTable);
 }
@@ -206,6 +224,7 @@ VideoSinkResult open_video_sink(std::string_view spec, const VideoFormat& format
     const std::string text(spec), name = "video sink \"" + text + "\": ";
     const VideoSinkKind* kind = find_kind(kVideoSinkTable, text);
     if (kind == nullptr) return Error{name + "expected " + forms_of(kVideoSinkTable)};
+    if (kind->by_code && link_code(format.pixel, format.link).empty()) return Error{name + no_code(format)};
     try {
         return kind->open(kind->rest_of(text), {format, full, controls});
     } catch (const std::exception& e) {  // no memory, no thread, no descriptor left
@@ -220,6 +239,7 @@ VideoSourceResult open_video_source(std::string_view spec, const VideoFormat& fo
     const VideoSourceKind* kind = find_kind(kVideoSourceTable, text);
     if (kind == nullptr && type_of(text) == 0 && !text.empty()) return no_such_path(text);
     if (kind == nullptr) return Error{name + "expected " + forms_of(kVideoSourceTable)};
+    if (kind->by_code && link_code(format.pixel, format.link).empty()) return Error{name + no_code(format)};
     try {
         auto source = kind->open(kind->rest_of(text), format);
         if (!source || kind->has_samples || format.link.is_samples()) return source;

@@ -36,9 +36,9 @@ public:
             const FrameAssembly::Counters& c = frames_.counters();
             counters_ = {.received = c.whole, .truncated = c.incomplete, .lost = c.missing};
             if (const auto& other = frames_.other_format(); other && c.whole == 0)
-                status_ = Error{
-                    "frames of " + std::to_string(other->width) + " x " + std::to_string(other->height) + " " +
-                    std::string(link_name(other->pixel, other->link)) + " came, expected those of the scene"};
+                status_ =
+                    Error{"frames of " + std::to_string(other->width) + " x " + std::to_string(other->height) +
+                          " " + link_text(other->pixel, other->link) + " came, expected those of the scene"};
             if (whole == nullptr) continue;
             std::ranges::copy(whole->bytes, frame.begin());
             return true;

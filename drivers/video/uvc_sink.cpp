@@ -45,8 +45,7 @@ VideoSinkResult open_uvc_sink(const std::string& address, const VideoSinkOptions
     if (!at) return Error{"uvc:" + address + ": expected uvc:[ADDRESS:]PORT, such as uvc:3240"};
     if (!uvc_carries(format.pixel) || !format.link.is_samples())
         return Error{"uvc:" + address + ": a USB camera here carries GREY, Y16 and YUYV, not " +
-                     std::string(link_name(format.pixel, format.link)) +
-                     "; expected another format of the camera in the scene"};
+                     link_text(format.pixel, format.link) + "; expected another format of the camera in the scene"};
     constexpr int kMax = 65535;  // of a frame descriptor
     if (format.width > kMax || format.height > kMax)
         return Error{"uvc:" + address + ": expected at most 65535 pixels each way"};

@@ -9,8 +9,10 @@
 namespace narpa {
 namespace {
 
+constexpr std::uint32_t kBigEndianFourcc = 1u << 31;  // v4l2_fourcc_be
+
 std::uint32_t fourcc(const VideoFormat& format) noexcept {
-    const std::string_view text = link_code(format.pixel, format.link);
+    const std::string text = link_code(format.pixel, format.link);
     std::uint32_t code = 0;
     for (int i = 0; i < 4; ++i)
         code |= std::uint32_t{static_cast<std::uint8_t>(text[static_cast<std::size_t>(i)])} << (8 * i);
@@ -67,6 +69,7 @@ bool is_same_format(const v4l2_pix_format& a, const v4l2_pix_format& b) noexcept
 std::string format_text(const v4l2_pix_format& pix) {
     std::string text;
     for (int i = 0; i < 4; ++i) text += static_cast<char>(pix.pixelformat >> (8 * i) & 0x7F);
+    if ((pix.pixelformat & kBigEndianFourcc) != 0) text += "-BE";
     return std::to_string(pix.width) + "x" + std::to_string(pix.height) + " " + text + ", " +
            std::to_string(pix.bytesperline) + " bytes a line";
 }

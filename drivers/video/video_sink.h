@@ -72,6 +72,8 @@ Result<std::unique_ptr<VideoSink>> open_video_sink(std::string_view spec, const 
 /// The kind that a text names; null: none.
 [[nodiscard]] const DeviceKind* video_sink_kind(const std::string& spec);
 /// All kinds, for --help.
+/// Whether a file could hold frames of this format and be written; it is left as it is.
+[[nodiscard]] Status check_video_file(const std::string& path, const VideoFormat& format);
 [[nodiscard]] std::string video_sink_help();
 
 }  // namespace narpa

@@ -53,10 +53,9 @@ std::optional<BulkFrameHeader> decode_bulk_header(std::span<const std::uint8_t> 
     h.width = get_le<std::uint32_t>(&b[BulkAt::kWidth]);
     h.height = get_le<std::uint32_t>(&b[BulkAt::kHeight]);
     h.pixels_crc32 = get_le<std::uint32_t>(&b[BulkAt::kPixelsCrc]);
-    const std::uint64_t row = link_row_bytes(h.width, h.pixel, h.link);
-    const auto told_row = get_le<std::uint32_t>(&b[BulkAt::kRow]),
-               told_size = get_le<std::uint32_t>(&b[BulkAt::kSize]);
-    if (told_size == 0 || told_row != row || told_size != row * h.height) return std::nullopt;
+    if (!take_row_bytes(get_le<std::uint32_t>(&b[BulkAt::kRow]), h.width, h.pixel, h.link)) return std::nullopt;
+    const auto told_size = get_le<std::uint32_t>(&b[BulkAt::kSize]);
+    if (told_size == 0 || told_size != h.pixel_bytes()) return std::nullopt;
     return h;
 }
 

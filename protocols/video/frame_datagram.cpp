@@ -72,21 +72,21 @@ std::optional<FrameDatagramHeader> decode_frame_datagram(std::span<const std::ui
     const std::string code(&b[DatagramAt::kFormat], &b[DatagramAt::kFormat] + 4);
     const std::optional<LinkPixels> pixels = link_from_code(code);
     if (!pixels) return std::nullopt;
-    const FrameDatagramHeader h{.t_ns = static_cast<std::int64_t>(get_le<std::uint64_t>(&b[DatagramAt::kTime])),
-                                .frame = get_le<std::uint32_t>(&b[DatagramAt::kFrame]),
-                                .pixel = pixels->samples,
-                                .link = pixels->layout,
-                                .width = get_le<std::uint16_t>(&b[DatagramAt::kWidth]),
-                                .height = get_le<std::uint16_t>(&b[DatagramAt::kHeight]),
-                                .index = get_le<std::uint32_t>(&b[DatagramAt::kIndex]),
-                                .count = get_le<std::uint32_t>(&b[DatagramAt::kCount]),
-                                .row = get_le<std::uint32_t>(&b[DatagramAt::kRow]),
-                                .byte_in_row = get_le<std::uint32_t>(&b[DatagramAt::kByte])};
-    const std::uint64_t row_bytes = link_row_bytes(h.width, h.pixel, h.link);
-    const std::uint64_t end = h.row * row_bytes + h.byte_in_row + bytes.size();
-    if (get_le<std::uint32_t>(&b[DatagramAt::kRowBytes]) != row_bytes || h.index >= h.count ||
-        h.byte_in_row >= row_bytes || end > row_bytes * h.height || h.count > row_bytes * h.height)
-        return std::nullopt;
+    FrameDatagramHeader h{.t_ns = static_cast<std::int64_t>(get_le<std::uint64_t>(&b[DatagramAt::kTime])),
+                          .frame = get_le<std::uint32_t>(&b[DatagramAt::kFrame]),
+                          .pixel = pixels->samples,
+                          .link = pixels->layout,
+                          .width = get_le<std::uint16_t>(&b[DatagramAt::kWidth]),
+                          .height = get_le<std::uint16_t>(&b[DatagramAt::kHeight]),
+                          .index = get_le<std::uint32_t>(&b[DatagramAt::kIndex]),
+                          .count = get_le<std::uint32_t>(&b[DatagramAt::kCount]),
+                          .row = get_le<std::uint32_t>(&b[DatagramAt::kRow]),
+                          .byte_in_row = get_le<std::uint32_t>(&b[DatagramAt::kByte])};
+    const auto row_bytes = get_le<std::uint32_t>(&b[DatagramAt::kRowBytes]);
+    if (!take_row_bytes(row_bytes, h.width, h.pixel, h.link)) return std::nullopt;
+    const std::uint64_t end = std::uint64_t{h.row} * row_bytes + h.byte_in_row + bytes.size();
+    const std::uint64_t most = std::uint64_t{row_bytes} * h.height;
+    if (h.index >= h.count || h.byte_in_row >= row_bytes || end > most || h.count > most) return std::nullopt;
     return h;
 }
 
@@ -133,8 +133,7 @@ const FrameAssembly::Frame* FrameAssembly::take(std::span<const std::uint8_t> da
     const std::optional<FrameDatagramHeader> h = decode_frame_datagram(datagram);
     const VideoFormat its{h ? h->width : 0, h ? h->height : 0, h ? h->pixel : PixelFormat::grey, format_.period_ns,
                           h ? h->link : LinkLayout{}};
-    const bool same = its.width == format_.width && its.height == format_.height &&
-                      link_code(its.pixel, its.link) == link_code(format_.pixel, format_.link);
+    const bool same = is_same_on_link(its, format_);
     if (h && !same) other_format_ = its;
     Part* const part = h && same ? part_of(*h) : nullptr;
     if (part == nullptr || h->count != part->came.size() || part->came[h->index]) {

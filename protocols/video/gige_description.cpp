@@ -11,18 +11,39 @@ struct GigeFormatRow {
     GigePixelFormat theirs;
 };
 constexpr auto kGigeFormats = std::to_array<GigeFormatRow>({
-    {"GREY", {"Mono8", 0x01080001}},       {"Y10", {"Mono10", 0x01100003}},
-    {"Y12", {"Mono12", 0x01100005}},       {"Y14", {"Mono14", 0x01100025}},
-    {"Y16", {"Mono16", 0x01100007}},       {"RGB24", {"RGB8", 0x02180014}},
-    {"YUYV", {"YUV422_8", 0x02100032}},    {"GRBG8", {"BayerGR8", 0x01080008}},
-    {"RGGB8", {"BayerRG8", 0x01080009}},   {"GBRG8", {"BayerGB8", 0x0108000A}},
-    {"BGGR8", {"BayerBG8", 0x0108000B}},   {"GRBG10", {"BayerGR10", 0x0110000C}},
-    {"RGGB10", {"BayerRG10", 0x0110000D}}, {"GBRG10", {"BayerGB10", 0x0110000E}},
-    {"BGGR10", {"BayerBG10", 0x0110000F}}, {"GRBG12", {"BayerGR12", 0x01100010}},
-    {"RGGB12", {"BayerRG12", 0x01100011}}, {"GBRG12", {"BayerGB12", 0x01100012}},
-    {"BGGR12", {"BayerBG12", 0x01100013}}, {"GRBG16", {"BayerGR16", 0x0110002E}},
-    {"RGGB16", {"BayerRG16", 0x0110002F}}, {"GBRG16", {"BayerGB16", 0x01100030}},
+    {"GREY", {"Mono8", 0x01080001}},
+    {"Y10", {"Mono10", 0x01100003}},
+    {"Y12", {"Mono12", 0x01100005}},
+    {"Y14", {"Mono14", 0x01100025}},
+    {"Y16", {"Mono16", 0x01100007}},
+    {"RGB24", {"RGB8", 0x02180014}},
+    {"YUYV", {"YUV422_8", 0x02100032}},
+    {"GRBG8", {"BayerGR8", 0x01080008}},
+    {"RGGB8", {"BayerRG8", 0x01080009}},
+    {"GBRG8", {"BayerGB8", 0x0108000A}},
+    {"BGGR8", {"BayerBG8", 0x0108000B}},
+    {"GRBG10", {"BayerGR10", 0x0110000C}},
+    {"RGGB10", {"BayerRG10", 0x0110000D}},
+    {"GBRG10", {"BayerGB10", 0x0110000E}},
+    {"BGGR10", {"BayerBG10", 0x0110000F}},
+    {"GRBG12", {"BayerGR12", 0x01100010}},
+    {"RGGB12", {"BayerRG12", 0x01100011}},
+    {"GBRG12", {"BayerGB12", 0x01100012}},
+    {"BGGR12", {"BayerBG12", 0x01100013}},
+    {"GRBG16", {"BayerGR16", 0x0110002E}},
+    {"RGGB16", {"BayerRG16", 0x0110002F}},
+    {"GBRG16", {"BayerGB16", 0x01100030}},
     {"BGGR16", {"BayerBG16", 0x01100031}},
+    {"Mono10p", {"Mono10p", 0x010A0046}},
+    {"Mono12p", {"Mono12p", 0x010C0047}},
+    {"BayerBG10p", {"BayerBG10p", 0x010A0052}},
+    {"BayerBG12p", {"BayerBG12p", 0x010C0053}},
+    {"BayerGB10p", {"BayerGB10p", 0x010A0054}},
+    {"BayerGB12p", {"BayerGB12p", 0x010C0055}},
+    {"BayerGR10p", {"BayerGR10p", 0x010A0056}},
+    {"BayerGR12p", {"BayerGR12p", 0x010C0057}},
+    {"BayerRG10p", {"BayerRG10p", 0x010A0058}},
+    {"BayerRG12p", {"BayerRG12p", 0x010C0059}},
 });
 
 std::string element(std::string_view name, const std::string& content) {
@@ -59,14 +80,14 @@ std::string enumeration(std::string_view name, std::string_view entry, std::uint
 }  // namespace
 
 Result<GigePixelFormat> gige_pixel_format(const VideoFormat& format) {
-    const std::string_view name = link_name(format.pixel, format.link);
+    const std::string name = link_text(format.pixel, format.link);
     for (const GigeFormatRow& row : kGigeFormats)
         if (row.ours == name) return row.theirs;
     std::string carried;
     for (const GigeFormatRow& row : kGigeFormats)
         if (!row.theirs.name.starts_with("Bayer")) carried.append(carried.empty() ? "" : ", ").append(row.ours);
-    return Error{"GigE Vision has no pixel format " + std::string(name) + "; it carries " + carried +
-                 ", and mosaics of 8, 10, 12 and 16 bits that are not packed"};
+    return Error{"GigE Vision has no pixel format " + name + "; it carries " + carried +
+                 ", and mosaics of 8, 10, 12 and 16 bits, packed as BayerRG10p or not"};
 }
 
 std::string gige_description(const VideoFormat& format, const GigePixelFormat& pixels, const GigeRegisters& at) {

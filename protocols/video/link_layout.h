@@ -1,7 +1,9 @@
-/// protocols/video/link_layout.h - frames of 16-bit samples as links carry them: right-justified, or packed.
+/// protocols/video/link_layout.h - frames of samples as links carry them: right-justified, packed, big-endian,
+/// with padding at the ends of rows.
 ///
 /// Source: MIPI CSI-2, RAW10 and RAW12; V4L2's Y10, Y12, Y14, Y10P, Y12P and Bayer formats (kernel documentation,
-/// "Pixel formats"). An embedded line keeps its bytes, at the start of the last row.
+/// "Pixel formats"); GenICam's Pixel Format Naming Convention, Mono10p and Mono12p. An embedded line keeps its
+/// bytes, at the start of the last row.
 #pragma once
 
 #include <cstdint>

@@ -128,7 +128,10 @@ std::optional<RtpContent> read_rtp(std::span<const std::uint8_t> packet) {
 }  // namespace
 
 Result<RtpSampling> rtp_sampling(const VideoFormat& f) {
-    const std::string name(link_name(f.pixel, f.link));
+    const std::string name = link_text(f.pixel, f.link);
+    if (!f.link.has_plain_rows())
+        return Error{"RFC 4175 has a byte order and rows of its own, not " + name +
+                     "; expected a camera without byte_order and row_bytes"};
     if (is_bayer(f.pixel))
         return Error{"RFC 4175 has no mosaics such as " + name + "; it carries " +
                      "GREY, Y10, Y12, Y14, Y16, YUYV and RGB24"};

@@ -39,8 +39,8 @@ void for_each_sample(const VideoFormat& f, const auto& copy) {
 Result<std::string> y4m_stream_header(const VideoFormat& format) {
     const std::string_view colour = link_y4m(format.pixel, format.link);
     if (colour.empty())
-        return Error{"Y4M cannot hold " + std::string(link_name(format.pixel, format.link)) +
-                     " frames; it holds GREY, Y10, Y12, Y16 and YUYV"};
+        return Error{"Y4M cannot hold frames of " + link_text(format.pixel, format.link) +
+                     "; it holds GREY, Y10, Y12, Y16 and YUYV"};
     if (format.width <= 0 || format.height <= 0 || format.period_ns <= 0)
         return Error{"Y4M needs a positive width, height and frame period"};
     if (std::string what = unfit_size(format.pixel, format.width, format.height); !what.empty())

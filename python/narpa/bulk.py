@@ -1,7 +1,7 @@
 """Frames as `narpa run --video CAMERA=bulk:` sends them to a USB frame bridge, for example an FPGA or FX3.
 
-The format is defined in protocols/video/README.md. Rows have no padding. `read` reads a stream that a bridge forwards to
-its host, or a recording of it. Truncated and corrupted frames are skipped.
+The format is defined in protocols/video/README.md. `read` reads a stream that a bridge forwards to its host, or a recording
+of it. Truncated and corrupted frames are skipped.
 """
 import struct
 import zlib
@@ -34,7 +34,8 @@ def decode(data):
     header = Header(t_ns, number, fourcc.decode("latin-1"), *sizes)
     row = pixel_formats.row_bytes(header.format, header.width)
     good = (version, length, crc) == (VERSION, HEADER_BYTES, zlib.crc32(data[: HEADER_BYTES - 4]))
-    return header if good and row == header.row_bytes and row * header.height == header.size > 0 else None
+    fits = 0 < row <= header.row_bytes
+    return header if good and fits and header.row_bytes * header.height == header.size > 0 else None
 
 
 def encode(pixels, t_ns, number, fourcc):

@@ -44,10 +44,10 @@ def decode(data):
         return None
     version, length, t_ns, frame, fourcc, *rest, crc = struct.unpack_from("<HHqI4sHHIIIIII", data, 4)
     header = Header(t_ns, frame, fourcc.decode("latin-1"), *rest)
-    row_bytes = pixel_formats.row_bytes(header.format, header.width)
-    end = header.row * row_bytes + header.byte_in_row + len(data) - HEADER_BYTES
+    end = header.row * header.row_bytes + header.byte_in_row + len(data) - HEADER_BYTES
     good = (version, length) == (VERSION, HEADER_BYTES) and crc == zlib.crc32(data[HEADER_BYTES:], zlib.crc32(data[:48]))
-    placed = row_bytes == header.row_bytes > header.byte_in_row and end <= row_bytes * header.height
+    fits = 0 < pixel_formats.row_bytes(header.format, header.width) <= header.row_bytes
+    placed = fits and header.byte_in_row < header.row_bytes and end <= header.row_bytes * header.height
     return (header, data[HEADER_BYTES:]) if good and placed and header.index < header.count else None
 
 
@@ -121,7 +121,7 @@ def main():
     for frame in receive(int(sys.argv[1])):
         h, now = frame.header, time.monotonic()
         rate = "" if before is None else f", {1e3 * (now - before):.1f} ms after the one before"
-        print(f"frame {h.frame}: {h.width} x {h.height} {h.format}, t = {h.t_ns * 1e-9:.6f} s, "
+        print(f"frame {h.frame}: {h.width} x {h.height} {pixel_formats.name(h.format)}, t = {h.t_ns * 1e-9:.6f} s, "
               f"{frame.lost} of {h.count} datagrams lost, mean {frame.pixels.mean():.2f}{rate}", flush=True)  # fmt: skip
         before = now
 

@@ -34,8 +34,11 @@ constexpr TableKeys kShutterKeys{.rows = kShutterRows, .kinds = [] {
                                      return std::vector<TableKind>{{"global"}, {"rolling", kRollingRows}};
                                  }};
 constexpr std::array<std::string_view, 4> kLatePolicyNames{"drop", "repeat", "late", "blank"};
+constexpr std::array<std::string_view, 2> kByteOrders{"little", "big"};
 constexpr TableKey kCameraRows[]{
     {"format", rows::choice<kCameraFormatNames>()},
+    {"byte_order", rows::choice<kByteOrders>()},
+    {"row_bytes", rows::integer(1, kLinkRowBytesMost)},
     {"rate_hz", rows::number({.low = 1e-3, .high = 10000})},
     {"embedded_line", rows::boolean()},
     {"test_pattern", rows::choice<kTestPatterns>()},
@@ -95,24 +98,36 @@ std::optional<CameraControlLimits> read_control(TableReader& camera, const Camer
     return control;
 }
 
-/// One name says what the samples are and how links lay them out.
+/// One name says what the samples are and how links lay them out; byte order and padding are keys of their own.
 void read_format(TableReader& table, Camera& camera) {
-    const std::optional<std::size_t> index = table.word("format");
-    if (!index) return;
-    if (*index < kPixelFormats.size()) {
-        camera.format = kPixelFormats[*index].format;
-        return;
+    const auto check = [&](const char* key) {
+        const std::string what = unfit_layout(camera.format, camera.link, camera.width);
+        if (!what.empty()) table.fail(key, what);
+    };
+    if (const std::optional<std::size_t> index = table.word("format")) {
+        if (*index < kPixelFormats.size()) {
+            camera.format = kPixelFormats[*index].format;
+        } else {
+            const LinkFormatRow& row = kLinkFormats[*index - kPixelFormats.size()];
+            camera.format = row.samples;
+            camera.link = row.layout;
+        }
+        check("format");
     }
-    const LinkFormatRow& row = kLinkFormats[*index - kPixelFormats.size()];
-    camera.format = row.samples;
-    camera.link = row.layout;
-    if (const std::string what = unfit_width(camera.format, camera.link, camera.width); !what.empty())
-        table.fail("format", what);
+    camera.link.big_endian = table.word("byte_order") == 1;
+    if (camera.link.big_endian) check("byte_order");
+    if (const auto bytes = table.integer("row_bytes")) {
+        camera.link.row_bytes = static_cast<std::uint32_t>(*bytes);
+        check("row_bytes");
+        const std::size_t pixels =
+            link_pixel_bytes(static_cast<std::size_t>(camera.width), camera.format, camera.link);
+        if (camera.link.row_bytes == pixels) camera.link.row_bytes = 0;
+    }
 }
 /// The link's pixels are the ADC's values.
 void check_bits_of_link(TableReader& table, Camera& camera) {
-    if (camera.link.is_samples()) return;
-    if (camera.embedded_line) camera.link.first_bytes_kept = kEmbeddedLineBytes;
+    if (camera.embedded_line && !camera.link.is_samples()) camera.link.first_bytes_kept = kEmbeddedLineBytes;
+    if (camera.link.kind == LinkLayout::Kind::samples) return;
     if (!camera.detector || camera.detector->bits != camera.link.bits)
         table.fail("format",
                    fmt::format("{} has pixels of {} bits, expected a [camera.detector] with bits = {}",

@@ -300,7 +300,7 @@ TEST(VideoSink, BadSinksSayWhatIsWrong) {
          {8, 8, PixelFormat::rgb24, 1},
          ErrorKind::bad_input,
          "it holds GREY, Y10, Y12, Y16 and YUYV"},
-        {folder / "out.y4m", {8, 8, PixelFormat::bggr16, 1}, ErrorKind::bad_input, "cannot hold BGGR16 frames"},
+        {folder / "out.y4m", {8, 8, PixelFormat::bggr16, 1}, ErrorKind::bad_input, "cannot hold frames of BGGR16"},
         {folder / "no/such/folder.y4m", kGrey, ErrorKind::missing, "cannot write: No such file or directory"},
         {"rtp", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},
         {"gige", kGrey, ErrorKind::bad_input, "expected /dev/videoN"},

@@ -15,7 +15,7 @@ import numpy as np
 import support
 from support import expect
 
-from narpa import y4m  # noqa: E402  (support sets the path)
+from narpa import pixels, y4m  # noqa: E402  (support sets the path)
 
 WIDTH, HEIGHT, FRAMES = 640, 480, 30
 NAME = "narpa-0001"
@@ -107,5 +107,24 @@ def check(pixel_format, code):
     expect(True, f"{code}: {len(first + again)} frames as FILE.y4m has them, with their numbers and times")
 
 
+def check_packed(code, bits):
+    """Frames of a test pattern, which the client unpacks."""
+    folder = support.work_folder()
+    scene = support.scene_with(folder, code)
+    scene.write_text(scene.read_text().replace("resolution = [160, 120]", 'resolution = [160, 120]\ntest_pattern = "prbs"'))
+    with support.Run(scene, "--video", f"{support.CAMERA}=gige:") as run:
+        run.wait_for(re.escape(f"GigE Vision camera {NAME} at 127.0.0.1"))
+        camera = Aravis.Camera.new(NAME)
+        expect(camera.get_pixel_format_as_string() == code, f"the client is told the pixel format, {code}")
+        frames = receive(camera, code, 10)
+        run.stop()
+    for number, _, frame in frames:
+        expected = pixels.test_pattern("prbs", number, 160 * 120, bits).reshape(120, 160)
+        if not np.array_equal(pixels.array(code, 160, 120, frame), expected):
+            expect(False, f"{code}: frame {number} is what it is computed to be")
+    expect(True, f"{code}: {len(frames)} frames of a pattern, unpacked")
+
+
 check("GREY", "Mono8")
+check_packed("Mono12p", 12)
 check("Y16", "Mono16")

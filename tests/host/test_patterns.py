@@ -25,6 +25,7 @@ fov_horizontal_deg = 40
 rate_hz = 10
 format = "{1}"
 test_pattern = "{2}"
+{4}
 [camera.detector]
 bits = {3}
 exposure_s = 0.001
@@ -35,13 +36,13 @@ def expected(pattern, frame, bits):
     return pixels.test_pattern(pattern, frame, SIZE[0] * SIZE[1], bits).reshape(SIZE[::-1])
 
 
-def check(folder, pattern, pixel_format, bits):
+def check(folder, pattern, pixel_format, bits, link="", in_y4m=True):
     scene, video = folder / "scene.toml", folder / "nav.y4m"
-    scene.write_text(SCENE.format(SIZE, pixel_format, pattern, bits))
+    scene.write_text(SCENE.format(SIZE, pixel_format, pattern, bits, link))
     port, came = support.free_port(), []
     receiver = threading.Thread(target=lambda: came.extend(datagrams.receive(port, "127.0.0.1", timeout_s=5)))
     receiver.start()
-    sinks = ["--video", f"nav=udp:127.0.0.1:{port}"] + ([] if pixel_format.endswith("P") else ["--video", f"nav={video}"])
+    sinks = ["--video", f"nav=udp:127.0.0.1:{port}"] + (["--video", f"nav={video}"] if in_y4m else [])
     support.narpa("run", scene, *sinks, "--duration", FRAMES / 10)
     receiver.join()
     expect(len(came) > 0, f"{pixel_format}, {pattern}: {len(came)} frames came")
@@ -61,4 +62,6 @@ folder = support.work_folder()
 for pattern in ("counter", "prbs"):
     check(folder, pattern, "GREY", 8)
     check(folder, pattern, "Y12", 12)
-    check(folder, pattern, "Y10P", 10)
+    check(folder, pattern, "Y10P", 10, in_y4m=False)
+    check(folder, pattern, "Y12", 12, 'byte_order = "big"\nrow_bytes = 160', in_y4m=False)
+    check(folder, pattern, "GREY", 8, "row_bytes = 65", in_y4m=False)

@@ -74,7 +74,7 @@ TEST(BulkFrame, AnyOneWrongBitIsFound) {
 TEST(BulkFrame, SizesThatDoNotAgreeAreRefused) {
     const BulkBytes good = encode_bulk_header({5, 6, PixelFormat::grey, 64, 48, 7});
     ASSERT_TRUE(decode_bulk_header(with(good, 40, 8))) << "another CRC of the pixels";
-    for (const auto& [at, value, what] : {std::tuple<std::size_t, std::uint32_t, const char*>{24, 63, "width"},
+    for (const auto& [at, value, what] : {std::tuple<std::size_t, std::uint32_t, const char*>{24, 65, "width"},
                                           {28, 0, "no height"},
                                           {28, 49, "height"},
                                           {32, 65, "row"},

@@ -23,15 +23,16 @@ TEST(GigeVision, CodesHaveTheSizeOfTheLinksPixels) {
     };
     for (const PixelFormatRow& row : kPixelFormats) check({64, 48, row.format, 100'000'000});
     for (const LinkFormatRow& row : kLinkFormats) check({64, 48, row.samples, 100'000'000, row.layout});
-    EXPECT_EQ(codes.size(), 23u);
-    EXPECT_EQ(refused, 14u) << "ten that are packed, and mosaics of 14 bits";
+    EXPECT_EQ(codes.size(), 33u);
+    EXPECT_EQ(refused, 14u) << "ten that are packed as MIPI does, and mosaics of 14 bits";
 }
 
 /// From the Pixel Format Naming Convention.
 TEST(GigeVision, CodesAreThoseOfTheConvention) {
     const std::map<std::string_view, std::uint32_t> expected{
-        {"Mono8", 0x01080001},    {"Mono12", 0x01100005},   {"Mono16", 0x01100007},   {"RGB8", 0x02180014},
-        {"YUV422_8", 0x02100032}, {"BayerRG8", 0x01080009}, {"BayerBG12", 0x01100013}};
+        {"Mono8", 0x01080001},    {"Mono12", 0x01100005},    {"Mono16", 0x01100007},    {"RGB8", 0x02180014},
+        {"YUV422_8", 0x02100032}, {"BayerRG8", 0x01080009},  {"BayerBG12", 0x01100013}, {"Mono10p", 0x010A0046},
+        {"Mono12p", 0x010C0047},  {"BayerRG12p", 0x010C0059}};
     std::size_t found = 0;
     const auto check = [&](const VideoFormat& format) {
         const auto pixels = gige_pixel_format(format);
@@ -47,10 +48,10 @@ TEST(GigeVision, CodesAreThoseOfTheConvention) {
 TEST(GigeVision, FormatsWithoutACodeAreNamed) {
     const auto packed = gige_pixel_format({64, 48, PixelFormat::y16, 1, {LinkLayout::Kind::mipi, 12}});
     ASSERT_FALSE(packed);
-    EXPECT_EQ(
-        packed.error().what,
-        "GigE Vision has no pixel format Y12P; it carries GREY, Y10, Y12, Y14, Y16, RGB24, YUYV, and mosaics of "
-        "8, 10, 12 and 16 bits that are not packed");
+    EXPECT_EQ(packed.error().what,
+              "GigE Vision has no pixel format Y12P; it carries GREY, Y10, Y12, Y14, Y16, RGB24, YUYV, Mono10p, "
+              "Mono12p, and mosaics of "
+              "8, 10, 12 and 16 bits, packed as BayerRG10p or not");
 }
 
 TEST(GigeVision, DescriptionHasTheFormatAndNothingToChange) {

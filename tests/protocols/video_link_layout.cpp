@@ -70,8 +70,10 @@ TEST(LinkLayout, NamesAndCodesAreThoseOfV4l2) {
     EXPECT_EQ(code("BGGR12P"), V4L2_PIX_FMT_SBGGR12P);
     std::set<std::string_view> names, codes;
     for (const LinkFormatRow& row : kLinkFormats) {
-        EXPECT_TRUE(names.insert(row.name).second && codes.insert(row.v4l2).second) << row.name;
-        const auto found = link_from_code(row.v4l2);
+        EXPECT_TRUE(names.insert(row.name).second) << row.name;
+        if (row.v4l2.empty()) continue;  // GenICam's
+        EXPECT_TRUE(codes.insert(row.v4l2).second) << row.name;
+        const auto found = link_from_code(std::string(row.v4l2));
         ASSERT_TRUE(found);
         EXPECT_EQ(found->samples, row.samples);
         EXPECT_EQ(found->layout, row.layout);
@@ -80,6 +82,7 @@ TEST(LinkLayout, NamesAndCodesAreThoseOfV4l2) {
     EXPECT_EQ(link_from_code("Y16 ")->samples, PixelFormat::y16);
     EXPECT_TRUE(link_from_code("Y16 ")->layout.is_samples());
     EXPECT_FALSE(link_from_code("????"));
+    EXPECT_FALSE(link_from_code(""));
 }
 
 TEST(LinkLayout, PixelsAreWhereTheDefinitionSays) {
@@ -93,6 +96,12 @@ TEST(LinkLayout, PixelsAreWhereTheDefinitionSays) {
             const std::size_t x = i % width;
             if (f.link.kind == LinkLayout::Kind::right) {
                 EXPECT_EQ(get_le<std::uint16_t>(&row[2 * x]), value) << link_name(f.pixel, f.link);
+            } else if (f.link.kind ==
+                       LinkLayout::Kind::genicam) {  // bit b of pixel x is bit x * bits + b of the row
+                for (std::size_t b = 0; b < f.link.bits; ++b) {
+                    const std::size_t bit = x * f.link.bits + b;
+                    EXPECT_EQ(row[bit / 8] >> (bit % 8) & 1, value >> b & 1) << link_name(f.pixel, f.link);
+                }
             } else if (f.link.bits == 10) {  // P1[9:2] P2[9:2] P3[9:2] P4[9:2] P4[1:0] P3[1:0] P2[1:0] P1[1:0]
                 EXPECT_EQ(row[x / 4 * 5 + x % 4], value >> 2);
                 EXPECT_EQ(row[x / 4 * 5 + 4] >> (2 * (x % 4)) & 3, value & 3);
@@ -127,13 +136,71 @@ TEST(LinkLayout, AnEmbeddedLineKeepsItsBytes) {
     }
 }
 
+/// Codes of big-endian formats have V4L2's mark; packed ones and those of 8 bits have no byte order.
+TEST(LinkLayout, BigEndianFormatsHaveV4l2sMark) {
+    const std::string y16 = link_code(PixelFormat::y16, {.big_endian = true});
+    EXPECT_EQ(v4l2_fourcc(y16[0], y16[1], y16[2], std::uint32_t{static_cast<std::uint8_t>(y16[3])}),
+              V4L2_PIX_FMT_Y16_BE);
+    const auto found = link_from_code(y16);
+    ASSERT_TRUE(found);
+    EXPECT_TRUE(found->layout.big_endian);
+    EXPECT_FALSE(found->layout.is_samples());
+    const LinkLayout r12{.kind = LinkLayout::Kind::right, .bits = 12, .big_endian = true};
+    EXPECT_EQ(link_from_code(link_code(PixelFormat::y16, r12))->layout, r12);
+    EXPECT_FALSE(link_from_code("GRE\xD9"));
+    EXPECT_FALSE(link_from_code("Y12\xD0"));
+    const LinkLayout packed{.kind = LinkLayout::Kind::mipi, .bits = 12, .big_endian = true};
+    EXPECT_EQ(unfit_layout(PixelFormat::y16, packed, 640),
+              "Y12P has no byte order, expected a format of 16 bits for a big-endian one");
+    EXPECT_NE(unfit_layout(PixelFormat::yuyv, {.big_endian = true}, 640), "");
+}
+
+/// The same bytes as without, with the two of each element exchanged and zeros up to the end of each row.
+TEST(LinkLayout, ByteOrderAndPaddingChangeNothingElse) {
+    std::vector<VideoFormat> formats = all_formats();
+    for (const PixelFormatRow& row : kPixelFormats) formats.push_back({24, 6, row.format, 1});
+    for (const VideoFormat& plain : formats)
+        for (const bool big : {false, true})
+            for (const std::uint32_t padding : {0u, 1u, 40u}) {
+                VideoFormat f = plain;
+                const std::size_t pixels = link_row_bytes(plain), row = pixels + padding;
+                f.link.big_endian = big;
+                f.link.row_bytes = padding == 0 ? 0 : static_cast<std::uint32_t>(row);
+                if (!unfit_layout(f.pixel, f.link, f.width).empty()) continue;
+                Pixels samples(frame_bytes(plain));
+                std::mt19937 random(7);
+                for (std::uint8_t& byte : samples) byte = static_cast<std::uint8_t>(random());
+                if (plain.link.kind != LinkLayout::Kind::samples) samples = samples_of(plain);
+                Pixels expected;
+                const Pixels without = laid_out(plain, samples);
+                for (std::size_t y = 0; y < 6; ++y) {
+                    for (std::size_t i = 0; i < pixels; ++i)
+                        expected.push_back(without[y * pixels + (big ? i ^ 1 : i)]);
+                    expected.resize(expected.size() + padding);
+                }
+                Pixels out(link_bytes(f), 0xAA), back(samples.size());
+                lay_out(f, samples, out);
+                EXPECT_EQ(out, expected) << link_text(f.pixel, f.link);
+                samples_of_link(f, out, back);
+                EXPECT_EQ(back, samples) << link_text(f.pixel, f.link);
+            }
+    LinkLayout rows{.row_bytes = 1279};
+    EXPECT_EQ(unfit_layout(PixelFormat::y16, rows, 640),
+              "rows of 1279 bytes, expected 1280 (the pixels of a row) to 1048576");
+    EXPECT_FALSE(take_row_bytes(1279, 640, PixelFormat::y16, rows));
+    EXPECT_TRUE(take_row_bytes(1280, 640, PixelFormat::y16, rows));
+    EXPECT_EQ(rows.row_bytes, 0u);
+    EXPECT_EQ(link_text(PixelFormat::y16, {.big_endian = true, .row_bytes = 1312}),
+              "Y16-BE with rows of 1312 bytes");
+}
+
 TEST(LinkLayout, PackedRowsNeedWholeGroups) {
     const LinkLayout p10{LinkLayout::Kind::mipi, 10}, p12{LinkLayout::Kind::mipi, 12};
-    EXPECT_EQ(unfit_width(PixelFormat::y16, p10, 642),
+    EXPECT_EQ(unfit_layout(PixelFormat::y16, p10, 642),
               "Y10P holds 4 pixels together, expected a width that is a multiple of 4, not 642");
-    EXPECT_EQ(unfit_width(PixelFormat::y16, p12, 642), "");
-    EXPECT_NE(unfit_width(PixelFormat::y16, p12, 641), "");
-    EXPECT_EQ(unfit_width(PixelFormat::y16, {}, 641), "");
+    EXPECT_EQ(unfit_layout(PixelFormat::y16, p12, 642), "");
+    EXPECT_NE(unfit_layout(PixelFormat::y16, p12, 641), "");
+    EXPECT_EQ(unfit_layout(PixelFormat::y16, {}, 641), "");
 }
 
 }  // namespace

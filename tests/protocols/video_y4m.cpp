@@ -22,9 +22,9 @@ TEST(Y4m, StreamHeaderHasSizeExactRateAndColourSpace) {
 
 TEST(Y4m, ErrorNamesTheFormatsThatItHolds) {
     EXPECT_EQ(header(8, 2, PixelFormat::rgb24, 1),
-              "error: Y4M cannot hold RGB24 frames; it holds GREY, Y10, Y12, Y16 and YUYV");
+              "error: Y4M cannot hold frames of RGB24; it holds GREY, Y10, Y12, Y16 and YUYV");
     EXPECT_EQ(header(8, 2, PixelFormat::grbg8, 1),
-              "error: Y4M cannot hold GRBG8 frames; it holds GREY, Y10, Y12, Y16 and YUYV");
+              "error: Y4M cannot hold frames of GRBG8; it holds GREY, Y10, Y12, Y16 and YUYV");
     EXPECT_EQ(header(7, 2, PixelFormat::yuyv, 1), "error: YUYV needs an even width, not 7");
     EXPECT_EQ(header(0, 2, PixelFormat::grey, 1), "error: Y4M needs a positive width, height and frame period");
     EXPECT_EQ(header(8, 2, PixelFormat::grey, 0), "error: Y4M needs a positive width, height and frame period");

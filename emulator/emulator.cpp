@@ -147,6 +147,7 @@ Status Emulator::open() {
     if (auto opened = open_observers(); !opened) return opened;
     if (!options_.mcap.empty())
         if (auto opened = open_mcap(); !opened) return opened;
+    if (auto opened = open_pulses(); !opened) return opened;
     if (logs)  // last, so that a run that cannot start keeps the log of an earlier one
         if (auto opened = open_logs(); !opened) return opened;
     if (!bus_) return Ok{};
@@ -193,6 +194,28 @@ Status Emulator::open_mcap() {
     mcap_ = *std::move(log);
     for (const auto& sensor : sensors_.all) sensor->record_to(*mcap_);
     for (const auto& feed : observers_) feed->observer().record_to(*mcap_);
+    return Ok{};
+}
+
+Status Emulator::open_pulses() {
+    const bool any = !options_.triggers.empty() || !options_.second_pulses.empty();
+    if (any && options_.lockstep) return Error{"pulses on lines and datagrams have no place in lockstep"};
+    if (!options_.triggers.empty() && !bus_)
+        return Error{"cameras are triggered as they are commanded, expected a --can BUS beside --trigger"};
+    const bool obeys =
+        std::ranges::any_of(world_->scene().cameras, [](const Camera& c) { return c.control.has_value(); });
+    if (!options_.triggers.empty() && !obeys)
+        return Error{"no camera can be triggered, expected control = {trigger = \"external\"} of one",
+                     world_->scene().file};
+    for (const std::string& spec : options_.triggers) {
+        auto source = open_pulse_source(spec);
+        if (!source) return source.error();
+        triggers_.push_back(*std::move(source));
+    }
+    if (options_.second_pulses.empty()) return Ok{};
+    auto line = open_pulse_sink(options_.second_pulses);
+    if (!line) return line.error();
+    second_pulses_ = std::make_unique<SecondPulses>(*std::move(line));
     return Ok{};
 }
 

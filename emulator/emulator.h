@@ -9,9 +9,11 @@
 
 #include "base/result.h"
 #include "base/stop.h"
+#include "drivers/pulse/pulse_source.h"
 #include "emulator/bus/can_node.h"
 #include "emulator/log/mcap_log.h"
 #include "emulator/realtime.h"
+#include "emulator/second_pulses.h"
 #include "emulator/sensor_kind.h"
 #include "emulator/system_utc.h"
 
@@ -58,6 +60,9 @@ public:
     [[nodiscard]] const SystemUtc* system_utc() const noexcept { return system_utc_.get(); }
     /// UTC of simulation time 0 at the end of the run.
     [[nodiscard]] const RunUtc& utc() const noexcept { return utc_; }
+    [[nodiscard]] const std::vector<std::unique_ptr<PulseSource>>& triggers() const noexcept { return triggers_; }
+    /// Null without RunOptions::second_pulses.
+    [[nodiscard]] const SecondPulses* second_pulses() const noexcept { return second_pulses_.get(); }
     /// Null without RunOptions::mcap.
     [[nodiscard]] const McapLog* mcap() const noexcept { return mcap_.get(); }
     [[nodiscard]] const RunOptions& options() const noexcept { return options_; }
@@ -92,12 +97,15 @@ private:
     /// Replaces the logs of an earlier run in the folder.
     Status open_logs();
     Status open_mcap();
+    Status open_pulses();
 
     void run_real_time(const StopFlag& stop);
     void become_real_time(const char* name, int priority);
     void run_sensor(Sensor& sensor, RealTimeRun& run, const StopFlag& stop);
     void run_bus(RealTimeRun& run, const StopFlag& stop);
     void run_observer(FrameFeed& feed, const StopFlag& stop);
+    /// Exposes the cameras for which pulses have come.
+    void take_pulses(const RealTimeClock& clock) noexcept;
     /// Sends what is due of the clock report and CANopen's SYNC and TIME, and returns when the next is.
     std::int64_t send_time(const RealTimeClock& clock, std::int64_t now_ns) noexcept;
     [[nodiscard]] ClockReport clock_report(const RealTimeClock& clock) const noexcept;
@@ -131,6 +139,8 @@ private:
     std::unique_ptr<RowLog> can_log_;
     std::unique_ptr<CanNode> can_;
     std::unique_ptr<McapLog> mcap_;
+    std::vector<std::unique_ptr<PulseSource>> triggers_;
+    std::unique_ptr<SecondPulses> second_pulses_;
     std::span<const SensorKind> kinds_;
     OpenSensors sensors_;
     std::vector<std::unique_ptr<FrameFeed>> observers_;

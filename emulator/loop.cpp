@@ -24,7 +24,7 @@ constexpr std::int64_t kBusWaitNs = 2'000'000;           // the longest that a l
 constexpr std::int64_t kLockstepWaitNs = 100'000'000;    // between two checks of the stop flag
 constexpr std::int64_t kStartingPeriodNs = 500'000'000;  // of heartbeats until a lockstep run begins, wall time
 constexpr int kCommanderGraceWaits = 10;  // times kLockstepWaitNs: grace period after the last commander has left
-constexpr int kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
+constexpr int kSecondPriority = 61, kBusPriority = 60, kTracingPriority = 49;  // the sensors' lie between
 
 /// Calls f on the threads on which the sensor works.
 void execute(const Sensor& sensor, TracingThreads& threads, const auto& f) {
@@ -89,13 +89,20 @@ void Emulator::send_heartbeat(std::int64_t t_ns, RunState state) noexcept {
 void Emulator::run_real_time(const StopFlag& stop) {
     if (!lock_memory()) notices_.push_back("memory is not locked (not permitted): page faults may cost deadlines");
     threads_->make_real_time(kTracingPriority);
-    RealTimeRun run(1 + sensors_.all.size() + (can_ ? 1 : 0), can_ ? can_->commanded_bodies() : 0,
-                    system_utc_.get());
+    RealTimeRun run(1 + sensors_.all.size() + (can_ ? 1 : 0) + (second_pulses_ ? 1 : 0),
+                    can_ ? can_->commanded_bodies() : 0, system_utc_.get());
     run.clock.set_epoch(world_->scene().epoch_unix_ns);
     run.clock.end_at(end_ns_);
     StopFlag sensors_done{false}, observers_done{false};
     std::thread bus;
     if (can_) bus = std::thread([&] { run_bus(run, observers_done); });
+    std::thread seconds;
+    if (second_pulses_)
+        seconds = std::thread([&] {
+            become_real_time("narpa-pps", kSecondPriority);
+            run.start.arrive_and_wait();
+            second_pulses_->run(run.clock, sensors_done);
+        });
     std::thread notifier([&] {
         name_thread("narpa-notes");
         run.to_report.acquire();
@@ -117,6 +124,7 @@ void Emulator::run_real_time(const StopFlag& stop) {
     for (std::thread& t : observers) t.join();
     observers_done = true;
     if (bus.joinable()) bus.join();
+    if (seconds.joinable()) seconds.join();
     run.to_report.release();
     notifier.join();
     t_ns_ = std::min(run.clock.now_ns(), run.clock.end_ns());
@@ -154,6 +162,7 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
         can_->wait(before, std::clamp<std::int64_t>(next_time - before, 0, kBusWaitNs));
         const std::int64_t now = clock.now_ns();
         next_time = send_time(clock, now);
+        take_pulses(clock);
         t_ns_.store(now, std::memory_order_relaxed);
         bool moved = false;
         for (int i = 0; i < kFramesPerTurn && can_->receive(now, moved); ++i) {
@@ -174,6 +183,16 @@ void Emulator::run_bus(RealTimeRun& run, const StopFlag& stop) {
     }
     send_telemetry(clock.now_ns());
     if (!can_->restart()) send_heartbeat(clock.now_ns(), RunState::stopping);
+}
+
+void Emulator::take_pulses(const RealTimeClock& clock) noexcept {
+    const std::int64_t zero_ns = clock.to_monotonic(0);
+    for (const auto& source : triggers_)
+        for (int i = 0; i < kFramesPerTurn; ++i) {
+            const auto t_ns = source->receive();
+            if (!t_ns) break;
+            can_->expose(TriggerMode::external, {*t_ns - zero_ns, clock.now_ns()});
+        }
 }
 
 std::int64_t Emulator::send_time(const RealTimeClock& clock, std::int64_t now_ns) noexcept {

@@ -120,6 +120,35 @@ std::string clock_text(const Emulator& emulator) {
                            : "not synchronised");
 }
 
+json triggers_document(const Emulator& emulator) {
+    json all = json::array();
+    for (const auto& source : emulator.triggers())
+        all.push_back({{"source", source->description()},
+                       {"pulses_received", source->counters().received},
+                       {"pulses_lost", source->counters().lost}});
+    return all;
+}
+
+json second_pulses_document(const SecondPulses* pulses) {
+    if (pulses == nullptr) return nullptr;
+    return {{"line", pulses->description()},
+            {"pulses", pulses->late().count()},
+            {"failed", pulses->failed()},
+            {"late_us", percentiles(pulses->late(), 1e-3)}};
+}
+
+std::string pulses_text(const Emulator& emulator) {
+    std::string text;
+    for (const auto& source : emulator.triggers())
+        text += fmt::format("  triggers, {}: {} pulses{}\n", source->description(), source->counters().received,
+                            source->counters().lost > 0 ? fmt::format(", {} lost", source->counters().lost) : "");
+    if (const SecondPulses* pulses = emulator.second_pulses())
+        text += fmt::format("  pulse per second, {}: {} pulses, late by {}{}\n", pulses->description(),
+                            pulses->late().count(), latency_text(pulses->late()),
+                            pulses->failed() > 0 ? fmt::format("; {} failed", pulses->failed()) : "");
+    return text;
+}
+
 /// Stopping a run that waits for its first command is no failure. A run that was commanded, but not for all of its
 /// bodies, could not begin and has failed.
 bool stopped_while_waiting(const Emulator& emulator) {
@@ -150,6 +179,8 @@ bool made_nothing(const Emulator& emulator) {
 json report(const Emulator& emulator) {
     json document{
         {"clock", clock_document(emulator)},
+        {"triggers", triggers_document(emulator)},
+        {"second_pulses", second_pulses_document(emulator.second_pulses())},
         {"scene", emulator.world().scene().name},
         {"mode", emulator.options().lockstep ? "lockstep" : "real time"},
         {"simulated_s", static_cast<double>(emulator.t_ns()) * 1e-9},
@@ -198,6 +229,7 @@ std::string to_text(const Emulator& emulator) {
     for (const auto& feed : emulator.observers()) out += feed->observer().to_text(feed->skipped());
     if (emulator.can()) out += bus_text(*emulator.can());
     out += clock_text(emulator);
+    out += pulses_text(emulator);
     if (!lockstep)
         out += fmt::format("  page faults while running: {} minor, {} major\n", emulator.page_faults().minor,
                            emulator.page_faults().major);

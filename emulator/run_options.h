@@ -17,6 +17,8 @@ class LidarUnit;
 struct RunOptions {
     std::string bus;                                                ///< BUS; empty: no commands
     std::vector<std::pair<std::string, std::string>> video, lidar;  ///< sensor name and SINK; a name may repeat
+    std::vector<std::string> triggers{};  ///< SOURCE of pulses for cameras in trigger mode external; needs a bus
+    std::string second_pulses{};          ///< LINE for one pulse per second; empty: none
     bool lockstep = false;
     double duration_s = 0;   ///< of simulation time; 0: until stopped or until a recorded bus ends
     std::string log_folder;  ///< empty: no log

@@ -14,8 +14,9 @@ enum class TriggerMode : std::uint8_t {
     free_running,  ///< the camera's own rate
     command,       ///< a CameraTrigger
     sync,          ///< the SYNC object of CANopen (CiA 301)
+    external,      ///< a pulse of a line or a datagram: drivers/pulse/pulse_source.h
 };
-inline constexpr std::array<std::string_view, 3> kTriggerModes{"free_running", "command", "sync"};
+inline constexpr std::array<std::string_view, 4> kTriggerModes{"free_running", "command", "sync", "external"};
 
 /// Pixels of the image that are read out; the others are black.
 struct Region {

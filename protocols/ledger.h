@@ -70,6 +70,9 @@ struct FrameLedger {
     // The clock when the frame was handed over; in the log only.
     std::int64_t utc_offset_ns = 0;  ///< UTC of simulation time 0, since 1970
     std::int64_t utc_error_ns = -1;  ///< estimated error of the system's UTC; -1: unknown, or not taken from it
+    /// The trigger of the exposure: when it reached this machine, and when narpa took it; in the log only. 0: the
+    /// camera runs freely.
+    std::int64_t t_trigger_ns = 0, t_trigger_taken_ns = 0;
     friend bool operator==(const FrameLedger&, const FrameLedger&) = default;
 };
 

@@ -46,7 +46,7 @@ inline constexpr auto kLedgerTriggers = numbered(kTriggerModes);
 
 // clang-format off
 /// First those of the CAN message, in the order of the DBC. The last are on CAN in a message of their own, CameraState.
-inline constexpr std::array<LedgerField, 33> kLedgerFields{{
+inline constexpr std::array<LedgerField, 35> kLedgerFields{{
     {&FrameLedger::frame, 0, "frame", 12, 0,
      {"Frame", "", "Frame number", 1, false, {0, 0, 32}, {0, 0, 32}}},
     {&FrameLedger::camera, -1, "", 6, 0,
@@ -104,12 +104,14 @@ inline constexpr std::array<LedgerField, 33> kLedgerFields{{
     {&FrameLedger::region_height, 28, "region_height", 150, 0, {}},
     {&FrameLedger::utc_offset_ns, 29, "utc_offset_ns", -1, 0, {}},
     {&FrameLedger::utc_error_ns, 30, "utc_error_ns", -1, 0, {}},
+    {&FrameLedger::t_trigger_ns, 31, "t_trigger_ns", -1, 0, {}},
+    {&FrameLedger::t_trigger_taken_ns, 32, "t_trigger_taken_ns", -1, 0, {}},
 }};
 // clang-format on
 
 /// The fields of the CSV log, in its order.
 inline constexpr auto kLedgerColumns = [] {
-    std::array<LedgerField, 31> columns{};
+    std::array<LedgerField, 33> columns{};
     for (const LedgerField& f : kLedgerFields)
         if (f.column >= 0) columns[static_cast<std::size_t>(f.column)] = f;
     return columns;

@@ -20,6 +20,8 @@
 #include "base/ready.h"
 #include "base/time.h"
 #include "drivers/lidar/packet_sink.h"
+#include "drivers/pulse/pulse_sink.h"
+#include "drivers/pulse/pulse_source.h"
 #include "drivers/service_manager.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/emulator.h"
@@ -204,6 +206,9 @@ Outcome run(const RunCommandOptions& options) {
         for (const std::string& output : sensor->outputs())
             say(fmt::format("{} {} -> {}", sensor->kind(), sensor->name(), output));
     for (const auto& feed : (*emulator)->observers()) say(feed->observer().description());
+    for (const auto& source : (*emulator)->triggers()) say("triggers: " + source->description());
+    if (const SecondPulses* pulses = (*emulator)->second_pulses())
+        say("pulse per second: " + pulses->description());
 
     notify_ready(options.ready_fd, addresses(o.bus, (*emulator)->can()));
     manager->notify("READY=1");
@@ -253,6 +258,14 @@ Command add_run(Parser app) {
         .type_name("SECONDS")
         .range(0.001, 1e6)
         .needs(lockstep);
+    c.option("--trigger", o->run.triggers,
+             pulse_source_help() + "; exposes the cameras in trigger mode external; may be given many times")
+        .type_name("SOURCE")
+        .repeatable()
+        .excludes(lockstep);
+    c.option("--pps", o->run.second_pulses, "One pulse per second of UTC: " + pulse_sink_help())
+        .type_name("LINE")
+        .excludes(lockstep);
     c.option("--seed", o->seed, "Seed of the sensors' noise and of the renders, instead of the scene's");
     c.option("--duration", o->run.duration_s, "Seconds of simulation time (default: until stopped)")
         .type_name("SECONDS")

@@ -125,7 +125,7 @@ void CanNode::refusals(PoseRefusals& out) const {
 DecodeStatus CanNode::take_camera_message(const CanFrame& frame, std::int64_t t_now_ns) noexcept {
     const bool plain = !frame.extended && !frame.remote && !frame.error && !frame.fd;
     if (frame.id == kSyncId && plain && frame.size <= 1) {  // CiA 301: empty, or a counter
-        sync(t_now_ns);
+        expose(TriggerMode::sync, {t_now_ns, t_now_ns});
         return DecodeStatus::complete;
     }
     CameraCommand c;
@@ -173,12 +173,12 @@ void CanNode::trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept {
     }
 }
 
-void CanNode::sync(std::int64_t t_now_ns) noexcept {
+void CanNode::expose(TriggerMode mode, const TriggerTimes& trigger) noexcept {
     std::int64_t latency_ns = 0;
     for (const CameraControl* camera : cameras_)
-        if (camera->awaits(TriggerMode::sync)) latency_ns = std::max(latency_ns, camera->latency_ns());
+        if (camera->awaits(mode)) latency_ns = std::max(latency_ns, camera->latency_ns());
     for (CameraControl* camera : cameras_)
-        if (camera->awaits(TriggerMode::sync)) camera->sync(t_now_ns + latency_ns, t_now_ns);
+        if (camera->awaits(mode)) camera->expose(mode, trigger.t_ns + latency_ns, trigger);
 }
 
 /// The latest time that the body's next command may have. In lockstep the clock follows the commands: its first one
@@ -199,7 +199,7 @@ void CanNode::send(Heartbeat heartbeat, std::int64_t t_now_ns) noexcept {
 
 void CanNode::send_sync(std::int64_t t_now_ns) noexcept {
     put({.id = kSyncId}, t_now_ns);
-    sync(t_now_ns);
+    expose(TriggerMode::sync, {t_now_ns, t_now_ns});
 }
 
 void CanNode::repeat_heartbeat() noexcept {

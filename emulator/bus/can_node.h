@@ -103,6 +103,9 @@ public:
     void repeat_heartbeat() noexcept;
     /// A command to a camera from another source than the bus; the reply goes to the bus as well.
     void command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
+    /// Exposes one frame of each camera in this trigger mode, all at the same time: the longest of their latencies
+    /// after the trigger.
+    void expose(TriggerMode mode, const TriggerTimes& trigger) noexcept;
     /// Sends commands and triggers to this camera too, which must outlive the run. Call before the run.
     void operate(CameraControl& camera) { cameras_.push_back(&camera); }
 
@@ -142,7 +145,6 @@ private:
     void trigger(CameraTrigger trigger, std::int64_t t_now_ns) noexcept;
     /// Answers a command or trigger that has an unknown choice.
     void refuse(std::uint8_t counter, std::uint8_t camera, bool to_trigger, std::int64_t t_now_ns) noexcept;
-    void sync(std::int64_t t_now_ns) noexcept;
     [[nodiscard]] std::uint8_t& counter(std::uint32_t base_id) noexcept {
         return sent_[base_id / kBaseIdStep % sent_.size()];
     }

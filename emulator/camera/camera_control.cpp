@@ -124,20 +124,20 @@ CameraAnswer CameraControl::check(const CameraCommand& command, const CameraSett
 }
 
 CameraReply CameraControl::trigger(const CameraTrigger& trigger, std::int64_t t_now_ns) noexcept {
-    const CameraAnswer answer = take_trigger(TriggerMode::command, trigger.t_ns, t_now_ns);
+    const CameraAnswer answer = take_trigger(TriggerMode::command, trigger.t_ns, {t_now_ns, t_now_ns});
     return {trigger.counter, index_, true, answer, answer == CameraAnswer::accepted ? trigger.t_ns : t_now_ns};
 }
 
-void CameraControl::sync(std::int64_t t_ns, std::int64_t t_now_ns) noexcept {
-    (void)take_trigger(TriggerMode::sync, t_ns, t_now_ns);
+void CameraControl::expose(TriggerMode mode, std::int64_t t_ns, const TriggerTimes& trigger) noexcept {
+    (void)take_trigger(mode, t_ns, trigger);
 }
 
-CameraAnswer CameraControl::take_trigger(TriggerMode mode, std::int64_t t_ns, std::int64_t t_now_ns) noexcept {
+CameraAnswer CameraControl::take_trigger(TriggerMode mode, std::int64_t t_ns, const TriggerTimes& times) noexcept {
     using enum CameraAnswer;
-    const CameraAnswer answer = !awaits(mode)                           ? wrong_mode
-                                : t_ns < earliest_trigger_ns(t_now_ns)  ? too_soon
-                                : !triggers_.push({t_ns, latest_mode_}) ? overrun
-                                                                        : accepted;
+    const CameraAnswer answer = !awaits(mode)                                  ? wrong_mode
+                                : t_ns < earliest_trigger_ns(times.t_ns)       ? too_soon
+                                : !triggers_.push({t_ns, latest_mode_, times}) ? overrun
+                                                                               : accepted;
     ++(answer == accepted ? counters_.triggers : counters_.triggers_refused);
     if (answer == accepted) t_next_trigger_ns_ = t_ns + latest_.period_ns;
     return answer;

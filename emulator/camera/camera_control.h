@@ -1,7 +1,7 @@
 /// emulator/camera/camera_control.h - a camera that is operated over CAN while it runs: checks commands and
 /// triggers as they come, and decides when the next exposure starts and with which settings.
 ///
-/// The CAN thread calls `command`, `trigger` and `sync`, the camera's thread the rest. A command that is received
+/// The CAN thread calls `command`, `trigger` and `expose`, the camera's thread the rest. A command that is received
 /// at t acts on the first frame whose exposure, with the new settings, starts at t + latency or later.
 #pragma once
 
@@ -36,6 +36,11 @@ struct CameraControlCounters {
     std::uint64_t triggers_dropped = 0;  ///< accepted, but the camera was stopped or in another mode by then
 };
 
+/// Of a trigger: when it reached this machine, and when narpa took it.
+struct TriggerTimes {
+    std::int64_t t_ns = 0, t_taken_ns = 0;
+};
+
 class CameraControl {
 public:
     CameraControl(const Camera& camera, std::uint8_t index);
@@ -45,8 +50,8 @@ public:
 
     [[nodiscard]] CameraReply command(const CameraCommand& command, std::int64_t t_now_ns) noexcept;
     [[nodiscard]] CameraReply trigger(const CameraTrigger& trigger, std::int64_t t_now_ns) noexcept;
-    /// On a SYNC object: exposes one frame at t_ns if the camera is in that trigger mode.
-    void sync(std::int64_t t_ns, std::int64_t t_now_ns) noexcept;
+    /// On a SYNC object or an external pulse: exposes one frame at t_ns if the camera is in that trigger mode.
+    void expose(TriggerMode mode, std::int64_t t_ns, const TriggerTimes& trigger) noexcept;
     /// True if the camera runs in this mode once all commands so far are in effect.
     [[nodiscard]] bool awaits(TriggerMode mode) const noexcept {
         return latest_.running && latest_.trigger == mode;
@@ -69,6 +74,10 @@ public:
     /// Settings of the next exposure.
     [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
     [[nodiscard]] std::uint8_t command_counter() const noexcept { return command_counter_; }
+    /// Of the next exposure; 0 where the camera runs freely.
+    [[nodiscard]] TriggerTimes trigger_times() const noexcept {
+        return settings_.trigger != TriggerMode::free_running && trigger_ ? trigger_->times : TriggerTimes{};
+    }
     /// Goes on to the next exposure after one was taken or skipped. `level`: mean of its image, as a fraction of
     /// full scale; absent: skipped.
     void advance(std::optional<double> level) noexcept;
@@ -83,9 +92,11 @@ private:
     struct Trigger {
         std::int64_t t_ns = 0;
         std::uint64_t mode = 0;  ///< value of this count for which it was accepted
+        TriggerTimes times{};
     };
     [[nodiscard]] CameraAnswer check(const CameraCommand& command, const CameraSettings& wanted) const noexcept;
-    [[nodiscard]] CameraAnswer take_trigger(TriggerMode mode, std::int64_t t_ns, std::int64_t t_now_ns) noexcept;
+    [[nodiscard]] CameraAnswer take_trigger(TriggerMode mode, std::int64_t t_ns,
+                                            const TriggerTimes& times) noexcept;
     bool adopt_next() noexcept;
     /// Start of the next exposure that is not free-running.
     [[nodiscard]] std::int64_t t_trigger_ns() const noexcept {

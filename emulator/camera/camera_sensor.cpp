@@ -124,6 +124,10 @@ void CameraSensor::make_next(const Clock& clock) {
     ledger.t_deadline_ns = deadline;
     const RunUtc utc = clock.utc();
     ledger.utc_offset_ns = utc.zero_unix_ns, ledger.utc_error_ns = utc.error_ns;
+    if (control_) {
+        const TriggerTimes trigger = control_->trigger_times();
+        ledger.t_trigger_ns = trigger.t_ns, ledger.t_trigger_taken_ns = trigger.t_taken_ns;
+    }
     stats_.render.add(monotonic_ns() - wall_start);
     stats_.wake_late.add(started - due_ns());
     stats_.radiance.add(unit_.durations().radiance_ns);

@@ -338,7 +338,7 @@ TEST_F(CameraControlTest, ValuesThatNoCameraHasAreAnswered) {
     pose(0);
     std::uint8_t counter = 0;
     for (const auto& [signal, value] : std::initializer_list<std::pair<std::size_t, std::int64_t>>{
-             {6, -1}, {7, -5}, {9, 70'000}, {4, -1}, {5, -1}, {11, -1}, {1, 2}, {2, 3}, {3, -1}}) {
+             {6, -1}, {7, -5}, {9, 70'000}, {4, -1}, {5, -1}, {11, -1}, {1, 2}, {2, 4}, {3, -1}}) {
         RawSignals raw{};
         for (std::size_t i = 1; i < kCameraCommandLayout.signals.size(); ++i) raw[i] = kNotAvailable;
         raw[signal] = value;

@@ -41,7 +41,7 @@ public:
         s.frame = static_cast<std::uint32_t>(below(std::int64_t{1} << 32));
         s.camera = static_cast<std::uint8_t>(below(256)), s.command_counter = static_cast<std::uint8_t>(below(256));
         CameraSettings& c = s.settings;
-        c.running = below(2) == 0, c.auto_exposure = below(2) == 0, c.trigger = static_cast<TriggerMode>(below(3));
+        c.running = below(2) == 0, c.auto_exposure = below(2) == 0, c.trigger = static_cast<TriggerMode>(below(4));
         c.exposure_ns = below(std::int64_t{1} << 47), c.period_ns = below(std::int64_t{1} << 47);
         c.gain_cdb = static_cast<std::int16_t>(below(6000)), c.binning = static_cast<std::uint8_t>(below(128));
         c.region = {static_cast<std::uint16_t>(below(65536)), static_cast<std::uint16_t>(below(65536)),
@@ -135,13 +135,13 @@ TEST(CanCameraValues, WhatIsMissingOrUnknownIsRefused) {
     MessageDecoder<CameraCommand> commands;
     EXPECT_EQ(decode(commands, kCameraCommandLayout, kCameraCommandBaseId), DecodeStatus::complete);
     for (const auto& [signal, value] :
-         std::initializer_list<std::pair<std::size_t, std::int64_t>>{{1, 2}, {1, -1}, {2, 3}, {2, -3}, {3, 2}}) {
+         std::initializer_list<std::pair<std::size_t, std::int64_t>>{{1, 2}, {1, -1}, {2, 4}, {2, -3}, {3, 2}}) {
         const std::int64_t before = std::exchange(raw[signal], value);
         EXPECT_EQ(decode(commands, kCameraCommandLayout, kCameraCommandBaseId), DecodeStatus::not_a_number)
             << kCameraCommandSignals[signal].name << " " << value;
         raw[signal] = before;
     }
-    raw[0] = 5, raw[2] = 3;
+    raw[0] = 5, raw[2] = 4;
     CameraCommand command;
     EXPECT_EQ(commands.accept(encode_fd(kCameraCommandLayout, raw, 77, kCameraCommandBaseId), 0, command),
               DecodeStatus::not_a_number);

@@ -139,7 +139,7 @@ TEST(EmbeddedLine, UnknownChoicesAreRefused) {
     ASSERT_TRUE(encode_embedded_line(ledger, row));
     EXPECT_FALSE(decode_embedded_line(row));
     ledger.budget_kind = BudgetKind::time;
-    ledger.trigger = static_cast<TriggerMode>(3);
+    ledger.trigger = static_cast<TriggerMode>(kTriggerModes.size());
     ASSERT_TRUE(encode_embedded_line(ledger, row));
     EXPECT_FALSE(decode_embedded_line(row));
 }

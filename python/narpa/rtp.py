@@ -128,8 +128,12 @@ def _components(groups, depth):
     """Components of whole groups of 4:2:2, four a row: Cb, Y0, Cr, Y1."""
     if depth in (8, 16):
         return np.frombuffer(groups, ">u2" if depth == 16 else np.uint8).reshape(-1, 4).astype(np.uint16)
-    bits = np.unpackbits(np.frombuffer(groups, np.uint8)).reshape(-1, 4, depth).astype(np.uint16)
-    return (bits << np.arange(depth - 1, -1, -1, dtype=np.uint16)).sum(axis=2, dtype=np.uint16)
+    b = np.frombuffer(groups, np.uint8).reshape(-1, 5 if depth == 10 else 3).T.astype(np.uint16)
+    if depth == 10:
+        values = [b[0] << 2 | b[1] >> 6, (b[1] & 63) << 4 | b[2] >> 4, (b[2] & 15) << 6 | b[3] >> 2, (b[3] & 3) << 8 | b[4]]
+    else:
+        values = [b[0] << 4 | b[1] >> 4, (b[1] & 15) << 8 | b[2]]
+    return np.stack(values, axis=1).reshape(-1, 4)
 
 
 class Assembly:
@@ -154,7 +158,7 @@ class Assembly:
             self._begin(packet)
         for part in packet.parts:
             self._place(*part)
-        return frames + ([self._end()] if self.begun.came.all() else [])
+        return frames + ([self._end()] if self.left == 0 else [])
 
     def _begin(self, packet):
         s = self.session
@@ -162,6 +166,7 @@ class Assembly:
         has_chroma = s.sampling != "RGB"
         planes = np.zeros((s.height, s.width) if has_chroma else (s.height, s.width, 3), deep)
         chroma = np.zeros((s.height, s.width // 2, 2), deep) if has_chroma else None
+        self.left = s.height * s.width  # pixels
         self.begun = Frame(packet.frame, packet.t_ns, packet.timestamp, planes, chroma, np.zeros((s.height, s.width), bool))
 
     def _place(self, row, offset, data):
@@ -173,7 +178,9 @@ class Assembly:
             c = _components(data, self.session.depth)
             self.begun.planes[row, offset:end] = c[:, 1::2].reshape(-1)
             self.begun.chroma[row, offset // 2 : end // 2] = c[:, ::2]
-        self.begun.came[row, offset:end] = True
+        came = self.begun.came[row, offset:end]
+        self.left -= came.size - np.count_nonzero(came)
+        came[:] = True
 
     def _end(self):
         frame, self.begun = self.begun, None

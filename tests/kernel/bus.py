@@ -1,12 +1,14 @@
 #!/usr/bin/python3
 """In the virtual machine: cansend commands poses on vcan0; the run survives vcan0 going down and up again. slcand makes a CAN
-interface of narpa's pseudo-terminal."""
+interface of narpa's pseudo-terminal. Of two redundant buses, vcan0 and vcan1, one goes down for good: no command is lost or used
+twice."""
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "host"))
+import can_devices
 import support
 from support import expect
 
@@ -14,11 +16,12 @@ POSES = support.flight(6)
 
 
 def start(bus_spec, video):
-    return support.Run(support.SCENE, "--can", bus_spec, "--video", f"{support.CAMERA}={video}", "--lockstep")
+    buses = [word for bus in bus_spec.split("+") for word in ("--can", bus)]
+    return support.Run(support.SCENE, *buses, "--video", f"{support.CAMERA}={video}", "--lockstep")
 
 
 def listen(run, interface):
-    return support.open_bus(run, interface="socketcan", channel=interface, fd=interface == "vcan0")
+    return support.open_bus(run, interface="socketcan", channel=interface, fd=interface.startswith("vcan"))
 
 
 def cansend(interface, messages):
@@ -92,6 +95,43 @@ def slcand(wire):
     compare(video, folder, f"slcan0, slcand on {pty}")
 
 
+def redundant(wire):
+    """Each command goes out on both buses, until vcan0 is cut after four of six."""
+    folder = support.work_folder()
+    video = folder / "nav.y4m"
+    can_devices.add_bus("vcan1")
+    frames = [wire.command(POSES[k], k * support.PERIOD_NS, k, fd=k % 2 == 1) for k in range(6)]
+    before, after = (sum(map(len, part)) for part in (frames[:4], frames[4:]))
+    with start("vcan0+vcan1", video) as run:
+        buses = [listen(run, interface) for interface in ("vcan0", "vcan1")]
+        listeners = [support.Wire() for _ in buses]  # of their own: a decoder joins the frames of one bus
+        for frame, messages in enumerate(frames):
+            if frame == 4:
+                can_devices.cut("vcan0")
+                buses.pop(0).shutdown()
+                listeners.pop(0)
+            for bus in buses if frame % 2 else buses[::-1]:
+                for message in messages:
+                    bus.send(message)
+            for bus, listener in zip(buses, listeners):
+                support.await_ledger(bus, listener, frame)
+        expect(True, "ledgers came on both buses, and on vcan1 after vcan0 was cut")
+        can = run.stop()["can"]
+        buses[0].shutdown()
+    print(f"vcan0+vcan1: {can}")
+    taken, missed, rejected = can["commands_taken"], can["commands_missed"], sum(can["rejected"].values())
+    expect((taken, missed, rejected) == (6, 0, 0), f"{taken} commands were taken, {missed} missed, {rejected} rejected")
+    a, b = can["buses"]
+    expect(a["frames_used"] + a["duplicates"] == before, f"of A all {before} frames before the cut were counted: {a}")
+    expect(b["frames_used"] + b["duplicates"] == before + after, f"of B all {before + after} frames were counted: {b}")
+    expect(a["frames_used"] + b["frames_used"] == before + after, "each frame was used once")
+    expect(a["interface_down"] == 1 and b["interface_down"] == 0, "A went down, B did not")
+    expect(b["frames_sent"] > a["frames_sent"] > 0, f"sent: {a['frames_sent']} frames on A, {b['frames_sent']} on B")
+    compare(video, folder, "vcan0 and vcan1, of which one is cut")
+    link("vcan0", "up")
+
+
 wire = support.Wire()
 vcan(wire)
 slcand(wire)
+redundant(wire)

@@ -20,7 +20,7 @@
  * thrusters do; the frame has to have come before. In lockstep it acts at the time of the report. */
 static const double kFrameDeadline_s = 0.20, kCommandLead_s = 0.25;
 static const double kBusPatience_s = 30, kStartPatience_s = 120, kHeartbeatSilence_s = 10;
-static const double kLockstepFrame_s = 2;          /* wall time after which a frame of a lockstep run counts as lost */
+static const double kLockstepFrame_s = 10;         /* wall time after which a frame of a lockstep run counts as lost */
 static const double kNoFrames_s = 5;               /* until it is reported, and again */
 static const int64_t kSameTime_ns = 1000000;       /* a frame is of the report's time if it is as close as this */
 static const int64_t kHeartbeatRounding_ns = 1000; /* heartbeats carry microseconds */
@@ -138,13 +138,14 @@ static void receive_messages(void) {
 
 /* --- Frames in --- */
 
-/* The time of a frame that does not say it: that of its ledger. In lockstep frames come in the order of the ledgers; in
- * real time it is the ledger that came nearest to the frame. */
+/* The time of a frame that does not say it: that of its ledger. In lockstep there is a ledger for each frame of the
+ * stream, and a frame may come when it is no longer waited for; in real time it is the ledger that came nearest to the
+ * frame. */
 static bool time_by_ledger(struct frame *frame) {
     const struct ledger *found = NULL;
     if (in_lockstep()) {
-        if (app.received <= app.delivered && app.delivered - app.received < LEDGERS_KEPT)
-            found = &app.ledgers[(app.received - 1) % LEDGERS_KEPT];
+        if (frame->number < app.delivered && app.delivered - frame->number <= LEDGERS_KEPT)
+            found = &app.ledgers[frame->number % LEDGERS_KEPT];
     } else {
         int64_t nearest_ns = (int64_t)(0.5e9 / mission.camera.rate_hz);
         for (uint64_t i = 0; i < LEDGERS_KEPT && i < app.delivered; ++i) {
@@ -160,7 +161,10 @@ static bool time_by_ledger(struct frame *frame) {
 /* Takes one frame, if there is one: the cycle looks at it before the next one replaces it. */
 static void receive_frame(void) {
     if (!frame_input_receive(&app.frame)) return;
-    ++app.received;
+    if (app.frame.is_timed)
+        ++app.received;
+    else if (app.frame.number >= app.received)
+        app.received = app.frame.number + 1;
     app.frame_seen_ns = app.frame.arrived_ns;
     app.has_frame = true;
 }

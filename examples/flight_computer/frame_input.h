@@ -12,6 +12,7 @@ struct frame {
     int64_t arrived_ns; /* CLOCK_MONOTONIC */
     bool is_timed;
     int64_t t_ns;                    /* if it is: middle of the exposure, clock of the emulator */
+    uint64_t number;                 /* unless it is: place in the stream from 0, lost frames included */
     uint8_t pixels[IMAGE_BYTES_MAX]; /* GREY, rows from the top */
 };
 

@@ -20,7 +20,8 @@ static char path[64];
 static int fd = -1;
 static int width, height;
 static int64_t t_tried_ns;
-static bool told_of_others;
+static bool told_of_others, has_first;
+static uint32_t first; /* sequence number of the first frame */
 static struct {
     void *at;
     size_t bytes;
@@ -79,6 +80,23 @@ static bool start(void) {
     return control(VIDIOC_STREAMON, &type) == 0;
 }
 
+/* v4l2loopback hands a new reader the last frame, which may be one of an earlier run, as long as any program has had
+ * the device open since. */
+static bool drop_old_frames(void) {
+    struct v4l2_buffer buffer = buffer_of(0);
+    while (control(VIDIOC_DQBUF, &buffer) == 0)
+        if (control(VIDIOC_QBUF, &buffer) < 0) return false;
+    return errno == EAGAIN;
+}
+
+/* Begins to stream if the device can. */
+static bool try_to_start(void) {
+    t_tried_ns = monotonic_ns(), has_first = false;
+    if (start() && drop_old_frames()) return true;
+    stop();
+    return false;
+}
+
 static int v4l2_open(const char *text, const struct camera_table *camera) {
     width = camera->width, height = camera->height;
     snprintf(path, sizeof path, "%s", text);
@@ -88,17 +106,14 @@ static int v4l2_open(const char *text, const struct camera_table *camera) {
         return EXIT_NO_DEVICE;
     }
     close(there);
+    try_to_start(); /* before the program says that it is ready: no frame is missed */
     return 0;
 }
 
 static bool v4l2_receive(struct frame *out) {
     if (fd < 0) {
         if (monotonic_ns() - t_tried_ns < (int64_t)(kTryAgain_s * 1e9)) return false;
-        t_tried_ns = monotonic_ns();
-        if (!start()) {
-            stop();
-            return false;
-        }
+        if (!try_to_start()) return false;
     }
     struct v4l2_buffer buffer = buffer_of(0);
     if (control(VIDIOC_DQBUF, &buffer) < 0) {
@@ -107,7 +122,11 @@ static bool v4l2_receive(struct frame *out) {
     }
     const size_t bytes = (size_t)width * (size_t)height;
     const bool whole = buffer.index < BUFFERS && buffer.bytesused == bytes && bytes <= buffers[buffer.index].bytes;
-    if (whole) memcpy(out->pixels, buffers[buffer.index].at, bytes), out->is_timed = false;
+    if (!has_first) has_first = true, first = buffer.sequence;
+    if (whole) {
+        memcpy(out->pixels, buffers[buffer.index].at, bytes);
+        out->is_timed = false, out->number = buffer.sequence - first;
+    }
     if (control(VIDIOC_QBUF, &buffer) < 0) stop();
     return whole;
 }

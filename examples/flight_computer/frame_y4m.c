@@ -17,6 +17,7 @@ static int width, height;
 static bool has_header, in_frame;
 static char line[256];
 static size_t line_bytes, have;
+static uint64_t frames;
 static uint8_t pixels[IMAGE_BYTES_MAX];
 
 static int y4m_open(const char *text, const struct camera_table *camera) {
@@ -75,7 +76,7 @@ static bool y4m_receive(struct frame *out) {
         if (have < frame_bytes) continue;
         in_frame = false;
         memcpy(out->pixels, pixels, frame_bytes);
-        out->is_timed = false;
+        out->is_timed = false, out->number = frames++;
         return true;
     }
 }

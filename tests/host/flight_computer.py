@@ -1,5 +1,8 @@
 #!/usr/bin/python3
-"""The flight computer in C of examples/: built by its Makefile, its tables against narpa's, and flown."""
+"""The flight computer in C of examples/: built by its Makefile, its tables against narpa's, and flown.
+
+Usage: flight_computer.py                 the test
+       flight_computer.py late PROGRAM    (by a rehearsal) PROGRAM, which gets one frame when it no longer waits for it"""
 import json
 import os
 import re
@@ -8,6 +11,7 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 import zlib
 from pathlib import Path
 from random import Random
@@ -16,6 +20,7 @@ import support
 from support import expect
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples/flight_computer"
+LATE_FRAME = 4
 SCENARIO = Path(os.environ["NARPA_BUILD_DIR"]) / "scenes/rehearsal/dispersions.toml"
 folder = support.work_folder()
 program = folder / "build/flight_computer"
@@ -82,7 +87,8 @@ def sets_are_those_of_python(fd):
 def rehearse(name, *options):
     """Returns exit status, verdict and what the program printed."""
     out = folder / name
-    done = subprocess.run([support.NARPA, "rehearse", SCENARIO, "-o", out, "--json", "--navigation", str(program), *options],
+    navigation = [] if "--navigation" in options else ["--navigation", program]
+    done = subprocess.run([support.NARPA, "rehearse", SCENARIO, "-o", out, "--json", *navigation, *options],
                           capture_output=True, text=True, timeout=1800)
     if done.returncode not in (0, 1):
         print(done.stderr)
@@ -122,6 +128,44 @@ def repeats_in_lockstep():
         sent.append([(m.name, m.counter, m.values) for _, m in Run(folder / name).messages() if m.name in ("Actuator", "Navigation")])
     expect(len(sent[0]) >= 16 and sent[1] == sent[0], f"in lockstep it sends the same again: {len(sent[0])} messages")
     expect(sent[2] == sent[0], "and the same when frames come in datagrams")
+
+
+def late(program):
+    """The program with a FIFO of its own, in which a frame is held back until the program says that it has not come."""
+    name, fifo = os.environ["VIDEO"].split("=")
+    gave_up, own = threading.Event(), fifo + ".late"
+    os.mkfifo(own)
+
+    def relay():
+        with open(fifo, "rb") as source, open(own, "wb") as sink:
+            header = source.readline()
+            sink.write(header), sink.flush()
+            width, height = (int(re.search(rb" %c(\d+)" % axis, header)[1]) for axis in b"WH")
+            number = 0
+            while line := source.readline():
+                pixels = source.read(width * height)
+                if number == LATE_FRAME:
+                    gave_up.wait()
+                sink.write(line + pixels), sink.flush()
+                number += 1
+
+    threading.Thread(target=relay, daemon=True).start()
+    flight = subprocess.Popen([program, "--video", f"{name}={own}"], stdout=subprocess.PIPE, text=True)
+    for line in flight.stdout:
+        print(line, end="", flush=True)
+        if "have not come" in line:
+            gave_up.set()
+    os.unlink(own)
+    sys.exit(flight.wait())
+
+
+def late_frame_is_not_taken_for_the_next():
+    wrapped = f"{sys.executable} -B {__file__} late {program}"
+    _, verdict, printed = rehearse("late", "--set", "scenario.duration_s=12.0", "--navigation", wrapped)
+    expect("1 frames have not come" in printed, "a frame that is late in lockstep is no longer waited for")
+    without, n = re.findall(r" (\d+\.\d+) s .*\(no frame\)", printed), verdict["navigation"]
+    expect(without == [f"{LATE_FRAME:.3f}"] and n["with_frames"] == n["estimates"] - 1, f"only the cycle of {without} s was without its frame")
+    expect(n["share_within"] == 1 and n["nees"] < 9, f"and the next frames have their own times: NEES {n['nees']:.2f}")
 
 
 def aborts_without_lamps():
@@ -188,6 +232,8 @@ def refuses_bad_arguments():
     refuses("expected slcan:HOST:PORT", "--video", f"nav=udp:{support.free_port()}", "--can", "slcan:host:", status=2)
 
 
+if sys.argv[1:2] == ["late"]:
+    late(sys.argv[2])
 build()
 messages_are_those_of_the_dbc()
 sets_are_those_of_python(fd=False)
@@ -197,4 +243,5 @@ counts_lost_datagrams()
 docks()
 mission_is_that_of_the_scenario()
 repeats_in_lockstep()
+late_frame_is_not_taken_for_the_next()
 aborts_without_lamps()

@@ -5,6 +5,10 @@ import subprocess
 def add_bus(name, mtu=72):
     """Adds a virtual CAN interface and sets it up. MTU 72: CAN FD; 16: classic frames alone."""
     subprocess.run(["ip", "link", "add", "dev", name, "mtu", str(mtu), "type", "vcan"], check=True)
+    set_up(name)
+
+
+def set_up(name):
     subprocess.run(["ip", "link", "set", name, "up"], check=True)
 
 

@@ -1,74 +1,50 @@
 #!/usr/bin/python3
 """In the virtual machine: the last 0.3 m of a docking with kernel devices, in lockstep and with small frames. The bus is CAN FD on
 vcan0; the navigation's only sensor is a USB camera, driven by the kernel's uvcvideo. The chaser docks and passes every gate.
+On vcan0+vcan1, two redundant buses, vcan0 goes down for good on the way.
 
 Usage: rehearse.py [BUS]   (outside the rig: rehearse.py slcan:0, with a FIFO in the camera's place)"""
 import json
 import os
 import re
+import socket
+import struct
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "host"))
+import can_devices
+import small_docking
 import support
 import usb_devices
 from support import expect
 
-SCENES = Path(os.environ["NARPA_BUILD_DIR"]) / "scenes"
 NAVIGATION = Path(support.NARPA).with_name("narpa-navigation")
 os.environ["NARPA_PLOT"] = "true"  # no charts: an emulated processor takes minutes for matplotlib
 BUS = sys.argv[1] if sys.argv[1:] else "vcan0"
+REDUNDANT = BUS == "vcan0+vcan1"
 CAMERA_PORT = 3241
-
-SCENARIO = """
-[scenario]
-based_on = "{scenes}/rehearsal/docking-camera.toml"
-name = "kernel"
-title = "The last 0.3 m, on kernel devices"
-scene = "scene.toml"
-duration_s = 120.0
-pose_rate_hz = 5.0
-
-[start]
-position_m = [0.3, 0.02, -0.02]
-position_sigma_m = [0.02, 0.01, 0.01]
-velocity_sigma_m_s = [0.002, 0.002, 0.002]
-attitude_sigma_deg = [0.2, 0.2, 0.2]
-rate_sigma_deg_s = [0.005, 0.005, 0.005]
-
-[[leg]]
-name = "contact"
-to_m = [0.0, 0.0, 0.0]
-speed_m_s = 0.075
-contact = true
-"""
+CUT_AFTER_ESTIMATES, NAVIGATION_ID = 4, 0x73F  # of CAN FD
 
 
-def write_port(folder):
-    """The station's faces within 1.5 m of its port: all that the camera sees. An emulated processor takes minutes to read and
-    sort the whole mesh in each process."""
-    docking = SCENES / "docking"
-    (folder / "station.mtl").write_text(re.sub(r"^map_Kd ", f"map_Kd {docking}/", (docking / "station.mtl").read_text(), flags=re.M))
-    near = [False]  # vertices, from 1 on
-    with open(docking / "station.obj") as mesh, open(folder / "port.obj", "w") as port:
-        for line in mesh:
-            if line.startswith("v "):
-                near.append(sum(float(x) ** 2 for x in line.split()[1:4]) < 1.5**2)
-            elif line.startswith("f ") and not all(near[int(corner.split("/")[0])] for corner in line.split()[1:]):
-                continue
-            port.write(line)
-    expect(sum(near) > 1000, "the port has more than 1000 vertices")
+def cut_on_the_way():
+    """Cuts vcan0 after some estimates, each of which is one frame."""
+    bus = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    bus.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+    bus.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", NAVIGATION_ID, socket.CAN_SFF_MASK))
+    bus.bind(("vcan0",))
 
+    def run():
+        for _ in range(CUT_AFTER_ESTIMATES):
+            bus.recv(72)
+        can_devices.cut("vcan0")
+        print("vcan0 is cut", flush=True)
 
-def small_scene():
-    """The rehearsals' scene with small frames and the station's port alone."""
-    text = (SCENES / "rehearsal/scene.toml").read_text()
-    text, changed = re.subn(r"^resolution = .*", "resolution = [160, 120]", text, flags=re.M)
-    expect(changed == 1, "the scene has one camera, now with 160 x 120 pixels")
-    text, changed = re.subn(r'"../docking/station.obj"', '"port.obj"', text)
-    expect(changed == 1, "the scene has one station")
-    return text.replace('"../docking/', f'"{SCENES}/docking/')
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread
 
 
 def start_navigation(log):
@@ -79,7 +55,8 @@ def start_navigation(log):
     told = dict(re.findall(r"^  (\w+)=(.*)$", log.read_text(), flags=re.M))
     usb_devices.attach(CAMERA_PORT)
     wait_until("uvcvideo has the camera", usb_devices.usb_camera)
-    command = [NAVIGATION, told["SCENARIO"], "--can", told["BUS"], "--video", f"nav={usb_devices.usb_camera()}", "--lockstep",
+    buses = [word for bus in told["BUS"].split("+") for word in ("--can", bus)]
+    command = [NAVIGATION, told["SCENARIO"], *buses, "--video", f"nav={usb_devices.usb_camera()}", "--lockstep",
                "--seed", told["SEED"], "--threads", "2", "--log", folder / "navigation"]  # fmt: skip
     with open(folder / "navigation.out", "w") as out, open(folder / "navigation.err", "w") as err:
         navigation = subprocess.Popen([str(c) for c in command], stdout=out, stderr=err)
@@ -88,12 +65,12 @@ def start_navigation(log):
 
 
 folder = support.work_folder()
-write_port(folder)
-(folder / "scene.toml").write_text(small_scene())
-(folder / "kernel.toml").write_text(SCENARIO.format(scenes=SCENES))
-command = [support.NARPA, "rehearse", folder / "kernel.toml", "-o", folder / "out", "--can", BUS, "--threads", "2",
-           "--patience", "300", "--json"]
-on_usb = BUS == "vcan0"
+command = [support.NARPA, "rehearse", small_docking.write(folder), "-o", folder / "out", "--threads", "2", "--patience", "300", "--json"]
+command += [word for bus in BUS.split("+") for word in ("--can", bus)]
+on_usb = BUS.startswith("vcan0")
+if REDUNDANT:
+    can_devices.add_bus("vcan1")
+    cut = cut_on_the_way()
 if on_usb:
     command += ["--video", f"nav=uvc:{CAMERA_PORT}", "--navigation", "none"]
 log = folder / "rehearse.err"
@@ -114,3 +91,13 @@ if on_usb:
     n = json.loads((folder / "navigation/navigation.json").read_text())
     taken = n["sensors"]["nav"]["taken"]
     expect(n["frames_missing"] == 0 and n["frames"] == n["cycles"] == taken > 5, f"each of {n['cycles']} cycles had its frame, by USB alone")
+if REDUNDANT:
+    cut.join(0)
+    expect(not cut.is_alive(), f"vcan0 was cut after {CUT_AFTER_ESTIMATES} of {n['cycles']} estimates")
+    report = (folder / "out/emulator.log").read_text()
+    uses = re.findall(r"(vcan\d) .*: (\d+) frames used, (\d+) as duplicates or not in use, (\d+) sent", report)
+    expect([name for name, *_ in uses] == ["vcan0", "vcan1"], f"the report has both buses: {uses}")
+    (used_a, twice_a, sent_a), (used_b, twice_b, sent_b) = (map(int, use[1:]) for use in uses)
+    expect(used_b > 0 and sent_b > sent_a > 0, "B was used, and has sent more than A")
+    expect(used_a + twice_a < used_b + twice_b, "of A fewer frames came: it was down")
+    expect(twice_a + twice_b > 50, "frames of both were counted as duplicates before the cut")

@@ -1,4 +1,4 @@
-/* SocketCAN: CAN FD where the interface's MTU is that of CAN FD, else classic frames. */
+/* SocketCAN: CAN FD where the interface's MTU is that of CAN FD or more, else classic frames. */
 #include <errno.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -23,10 +23,12 @@ const char *socketcan_open(struct can_bus *bus, const char *interface) {
         trouble = strerror(errno);
     } else {
         const int on = 1;
-        bus->carries_fd = request.ifr_mtu == CANFD_MTU;
+        bus->carries_fd = request.ifr_mtu >= (int)CANFD_MTU;
         setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on); /* to receive them */
         if (ioctl(fd, SIOCGIFINDEX, &request) < 0) trouble = strerror(errno);
         address.can_ifindex = request.ifr_ifindex;
+        if (trouble == NULL && ioctl(fd, SIOCGIFFLAGS, &request) < 0) trouble = strerror(errno);
+        if (trouble == NULL && (request.ifr_flags & IFF_UP) == 0) trouble = "the interface is down";
         if (trouble == NULL && bind(fd, (const struct sockaddr *)&address, sizeof address) < 0)
             trouble = strerror(errno);
     }
@@ -60,8 +62,9 @@ bool socketcan_send(struct can_bus *bus, const struct can_frame_bytes *frame) {
     memcpy(out.data, frame->data, frame->length);
     const size_t bytes = frame->fd ? CANFD_MTU : CAN_MTU;
     for (int attempt = 0; attempt < 20; ++attempt) { /* the interface's queue may be full for some frames' time */
-        if (send(bus->fd, &out, bytes, 0) == (ssize_t)bytes) return true;
-        if (errno != ENOBUFS && errno != EINTR) return false;
+        /* Without waiting: a bus on which nobody acknowledges frames must not stop the control cycle. */
+        if (send(bus->fd, &out, bytes, MSG_DONTWAIT) == (ssize_t)bytes) return true;
+        if (errno != ENOBUFS && errno != EAGAIN && errno != EINTR) return false;
         usleep(500);
     }
     return false;

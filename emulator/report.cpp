@@ -57,8 +57,10 @@ json bus_document(const CanNode& node) {
 std::string buses_text(const CanBus& bus) {
     std::string text;
     for (const BusUse& use : bus.uses())
-        text += fmt::format("    {}: {} frames used, {} as duplicates or not in use, {} sent\n", use.bus, use.used,
-                            use.duplicates + use.idle, use.counters.sent);
+        text += fmt::format("    {}: {} frames used, {} as duplicates or not in use, {} sent; faults: {}\n",
+                            use.bus, use.used, use.duplicates + use.idle, use.counters.sent,
+                            non_zero({{"not sent", use.counters.send_drops},
+                                      {"connection or interface lost", use.counters.interface_down}}));
     if (bus.switches() > 0) text += fmt::format("    the other bus was taken into use {} times\n", bus.switches());
     return text;
 }

@@ -99,5 +99,7 @@ if REDUNDANT:
     expect([name for name, *_ in uses] == ["vcan0", "vcan1"], f"the report has both buses: {uses}")
     (used_a, twice_a, sent_a), (used_b, twice_b, sent_b) = (map(int, use[1:]) for use in uses)
     expect(used_b > 0 and sent_b > sent_a > 0, "B was used, and has sent more than A")
+    faults = re.findall(r"frames used, .* sent; faults: (.*)", report)
+    expect(re.fullmatch(r"[1-9]\d* not sent, 1 connection or interface lost", faults[0]) and faults[1] == "none", f"A was lost: {faults}")
     expect(used_a + twice_a < used_b + twice_b, "of A fewer frames came: it was down")
     expect(twice_a + twice_b > 50, "frames of both were counted as duplicates before the cut")

@@ -1,5 +1,6 @@
 #include "emulator/second_pulses.h"
 
+#include <algorithm>
 #include <optional>
 
 namespace narpa {
@@ -29,7 +30,7 @@ void SecondPulses::run(const RealTimeClock& clock, const StopFlag& stop) noexcep
         const bool set = line_->set(true);
         const std::int64_t late_ns = clock.now_ns() - *second_ns;
         set ? late_.add(late_ns) : void(++failed_);
-        (void)clock.wait_until(*second_ns + kHigh_ns, stop);
+        (void)clock.wait_until(*second_ns + std::max(kHigh_ns, late_ns + kHigh_ns / 2), stop);
         (void)line_->set(false);
     }
 }

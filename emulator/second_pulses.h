@@ -16,7 +16,7 @@ namespace narpa {
 
 class SecondPulses {
 public:
-    static constexpr std::int64_t kHigh_ns = 100'000'000;
+    static constexpr std::int64_t kHigh_ns = 100'000'000;  ///< half of that at least after a late start
 
     explicit SecondPulses(std::unique_ptr<PulseSink> line) : line_(std::move(line)) {}
 

@@ -120,7 +120,10 @@ Result<std::unique_ptr<Emulator>> Emulator::create_next(std::unique_ptr<Emulator
 
 void Emulator::take_world(std::unique_ptr<World> world) {
     world_ = std::move(world);
-    if (world_->scene().time.source == TimeSettings::Source::system) system_utc_ = std::make_unique<SystemUtc>();
+    if (const TimeSettings& time = world_->scene().time; time.source == TimeSettings::Source::system) {
+        system_utc_ = std::make_unique<SystemUtc>();
+        ptp4l_ = std::make_unique<Ptp4lWatch>(time.ptp4l, static_cast<std::uint8_t>(time.ptp4l_domain));
+    }
     lockstep_.clock.set_epoch(world_->scene().epoch_unix_ns);
     utc_ = lockstep_.clock.utc();
 }

@@ -12,6 +12,7 @@
 #include "drivers/pulse/pulse_source.h"
 #include "emulator/bus/can_node.h"
 #include "emulator/log/mcap_log.h"
+#include "emulator/ptp4l_watch.h"
 #include "emulator/realtime.h"
 #include "emulator/second_pulses.h"
 #include "emulator/sensor_kind.h"
@@ -58,6 +59,8 @@ public:
     [[nodiscard]] const std::vector<std::unique_ptr<FrameFeed>>& observers() const noexcept { return observers_; }
     /// The system's clock, where the run takes UTC from it; else null.
     [[nodiscard]] const SystemUtc* system_utc() const noexcept { return system_utc_.get(); }
+    /// ptp4l's state, where the run takes UTC from the system's clock; else null.
+    [[nodiscard]] const Ptp4lWatch* ptp4l() const noexcept { return ptp4l_.get(); }
     /// UTC of simulation time 0 at the end of the run.
     [[nodiscard]] const RunUtc& utc() const noexcept { return utc_; }
     [[nodiscard]] const std::vector<std::unique_ptr<PulseSource>>& triggers() const noexcept { return triggers_; }
@@ -134,6 +137,7 @@ private:
     std::int64_t end_ns_ = Clock::kNever;  ///< of the simulation clock
     std::unique_ptr<World> world_;
     std::unique_ptr<SystemUtc> system_utc_;
+    std::unique_ptr<Ptp4lWatch> ptp4l_;
     RunUtc utc_{};
     std::unique_ptr<CanBus> bus_;
     std::unique_ptr<RowLog> can_log_;

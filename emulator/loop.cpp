@@ -225,8 +225,8 @@ ClockReport Emulator::clock_report(const RealTimeClock& clock) const noexcept {
             .leap_second_today = discipline.leap_second_today,
             .steps = static_cast<std::uint8_t>(system_utc_->steps()),
             .tai_less_utc_s = static_cast<std::int16_t>(discipline.tai_less_utc_s),
-            .error_s = discipline.synchronised ? 1e-9 * static_cast<double>(discipline.error_ns)
-                                               : std::numeric_limits<double>::quiet_NaN(),
+            .error_s = discipline.error_ns >= 0 ? 1e-9 * static_cast<double>(discipline.error_ns)
+                                                : std::numeric_limits<double>::quiet_NaN(),
             .frequency_ppm = 1e-3 * static_cast<double>(discipline.frequency_ppb)};
 }
 

@@ -109,6 +109,7 @@ json clock_document(const Emulator& emulator) {
         clock["tai_less_utc_s"] = d.tai_less_utc_s;
         clock["steps"] = system->steps();
         clock["last_step_s"] = 1e-9 * static_cast<double>(system->last_step_ns());
+        clock["ptp4l"] = to_json(emulator.ptp4l()->report());
     }
     return clock;
 }
@@ -116,10 +117,9 @@ json clock_document(const Emulator& emulator) {
 std::string clock_text(const Emulator& emulator) {
     if (!emulator.system_utc()) return {};
     const RunUtc& utc = emulator.utc();
-    return fmt::format("  clock: the system's UTC, time 0 is {}, {}\n", utc_text(utc.zero_unix_ns),
-                       utc.synchronised
-                           ? fmt::format("estimated error {:g} us", 1e-3 * static_cast<double>(utc.error_ns))
-                           : "not synchronised");
+    return fmt::format("  clock: the system's UTC, time 0 is {}, {}\n    ptp4l: {}\n", utc_text(utc.zero_unix_ns),
+                       utc.synchronised ? "synchronised, " + error_text(utc.error_ns) : "not synchronised",
+                       to_text(emulator.ptp4l()->report()));
 }
 
 json triggers_document(const Emulator& emulator) {

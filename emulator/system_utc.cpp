@@ -1,5 +1,6 @@
 #include "emulator/system_utc.h"
 
+#include <fmt/format.h>
 #include <sys/timex.h>
 
 #include <cstdlib>
@@ -36,11 +37,23 @@ ClockDiscipline read_clock_discipline() noexcept {
     const int state = ::adjtimex(&t);
     ClockDiscipline d;
     d.synchronised = state >= 0 && state != TIME_ERROR && (t.status & STA_UNSYNC) == 0;
-    if (d.synchronised) d.error_ns = t.esterror * 1000, d.error_max_ns = t.maxerror * 1000;
-    d.frequency_ppb = t.freq * 1000 / 65536;  // in units of 2^-16 ppm
+    // ptp4l and phc2sys state no estimate: esterror keeps the kernel's initial value (NTP_PHASE_LIMIT).
+    constexpr long kNotStated_us = 16'000'000;
+    if (d.synchronised) {
+        if (t.esterror < kNotStated_us) d.error_ns = t.esterror * 1000;
+        d.error_max_ns = t.maxerror * 1000;
+    }
+    // freq, in units of 2^-16 ppm, reaches 500 ppm; ptp4l and phc2sys correct more by the length of the kernel's
+    // tick, nominally 10000 us, of which 1 us is 100 ppm.
+    d.frequency_ppb = t.freq * 1000 / 65536 + (t.tick - 10'000) * 100'000;
     d.tai_less_utc_s = t.tai;
     d.leap_second_today = state == TIME_INS || state == TIME_DEL;
     return d;
+}
+
+std::string error_text(std::int64_t error_ns) {
+    return error_ns < 0 ? "error not stated"
+                        : fmt::format("estimated error {:g} us", 1e-3 * static_cast<double>(error_ns));
 }
 
 std::int64_t SystemUtc::offset_ns() noexcept {

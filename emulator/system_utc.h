@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <string>
 
 namespace narpa {
 
@@ -17,14 +18,16 @@ struct UtcOffset {
 
 /// What the kernel knows of its clock: adjtimex(2).
 struct ClockDiscipline {
-    bool synchronised = false;        ///< the one that disciplines the clock says so (STA_UNSYNC is off)
-    std::int64_t error_ns = -1;       ///< estimated error of UTC, as it states; -1: not synchronised
-    std::int64_t error_max_ns = -1;   ///< bound of the error
-    std::int64_t frequency_ppb = 0;   ///< correction of the clock's frequency: its drift, with the opposite sign
+    bool synchronised = false;       ///< the one that disciplines the clock says so (STA_UNSYNC is off)
+    std::int64_t error_ns = -1;      ///< estimated error of UTC, as it states; -1: it states none, not synchronised
+    std::int64_t error_max_ns = -1;  ///< bound of the error
+    std::int64_t frequency_ppb = 0;  ///< correction of the clock's frequency: its drift, with the opposite sign
     std::int32_t tai_less_utc_s = 0;  ///< 0: not known
     bool leap_second_today = false;   ///< one is inserted or deleted at the end of the UTC day
 };
 [[nodiscard]] ClockDiscipline read_clock_discipline() noexcept;
+/// "estimated error 12 us"; of -1: "error not stated".
+[[nodiscard]] std::string error_text(std::int64_t error_ns);
 
 /// UTC on CLOCK_MONOTONIC, with the steps that the system's clock has made. Any thread may use it.
 class SystemUtc {

@@ -137,6 +137,7 @@ Outcome check(const CheckOptions& o) {
     }
 
     std::vector<Finding> findings = general_findings();
+    for (Finding& f : clock_findings((*world)->scene().time)) findings.push_back(std::move(f));
     const std::size_t general = findings.size();
     if (auto tested = test_devices(o.devices, o.named, (*world)->scene(), findings); !tested) return tested.error();
     nlohmann::json machine = nlohmann::json::array();

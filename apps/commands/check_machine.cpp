@@ -18,6 +18,8 @@
 #include "drivers/video/bulk_bridges.h"
 #include "drivers/video/video_sink.h"
 #include "emulator/lidar/lidar_sensor.h"
+#include "emulator/ptp4l_watch.h"
+#include "emulator/system_utc.h"
 #include "protocols/lidar/lidar_model.h"
 
 namespace narpa::cli {
@@ -147,6 +149,22 @@ std::vector<Finding> general_findings() {
                        "SCHED_FIFO is not permitted: deadlines may slip under load", "rtprio 90"),
             permission("locked memory", RLIMIT_MEMLOCK, RLIM_INFINITY, "mlockall",
                        "limit {} KiB: page faults may cost deadlines", "memlock unlimited")};
+}
+
+std::vector<Finding> clock_findings(const TimeSettings& time) {
+    if (time.source != TimeSettings::Source::system) return {};
+    const ClockDiscipline d = read_clock_discipline();
+    Finding clock{"system's clock", d.synchronised, "", ""};
+    if (d.synchronised) {
+        clock.detail =
+            "synchronised, " + error_text(d.error_ns) +
+            fmt::format(", frequency corrected by {:+.3f} ppm", 1e-3 * static_cast<double>(d.frequency_ppb));
+    } else {
+        clock.detail = "not synchronised: UTC is as it was set";
+        clock.remedy = "ptp4l with phc2sys, chrony or ntpd";
+    }
+    const Ptp4lReport ptp4l = read_ptp4l(time.ptp4l, static_cast<std::uint8_t>(time.ptp4l_domain));
+    return {clock, {"ptp4l", ptp4l.last.result == Ptp4lReading::Result::answered, to_text(ptp4l), ""}};
 }
 
 Status test_devices(const std::vector<std::string>& devices, const DeviceOptions& named, const Scene& scene,

@@ -175,6 +175,9 @@ struct TimeSettings {
 
     Source source = Source::free;
     OnRestart on_restart = OnRestart::refuse;
+    /// Path of the socket on which ptp4l answers management messages; empty: the usual paths. Of Source::system.
+    std::string ptp4l{};
+    int ptp4l_domain = 0;  ///< PTP domain of that ptp4l
 };
 
 /// What narpa does on CAN besides commands and telemetry.

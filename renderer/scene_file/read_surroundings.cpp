@@ -35,6 +35,8 @@ constexpr TableKey kRenderRows[]{
 constexpr TableKey kTimeRows[]{
     {"source", rows::choice<TimeSettings::kSourceNames>()},
     {"on_restart", rows::choice<TimeSettings::kOnRestartNames>()},
+    {"ptp4l", rows::text()},
+    {"ptp4l_domain", rows::integer(0, 255)},
 };
 constexpr Range kCanPeriod{.low = 0.001, .high = 3600};
 constexpr TableKey kCanRows[]{
@@ -113,11 +115,26 @@ void read_render(TableReader& root, Scene& scene) {
     table->finish();
 }
 
+/// sun_path of unix(7) has 108 bytes, one of which ends the path.
+bool is_socket_path(const std::string& path) {
+    return path.starts_with('/') && path.size() < 108;
+}
+
 void read_time(TableReader& root, Scene& scene) {
     auto table = root.table("time");
     if (!table) return;
     table->read("source", scene.time.source);
     table->read("on_restart", scene.time.on_restart);
+    // No error: a scene with its own socket also runs in lockstep, by --set 'time.source="free"'.
+    if (scene.time.source != TimeSettings::Source::system)
+        for (const std::string_view key : {"ptp4l", "ptp4l_domain"})
+            if (table->has(key))
+                scene.warnings.push_back(
+                    fmt::format("{} of [time] has no effect: it belongs to source = \"system\"", key));
+    table->read("ptp4l", scene.time.ptp4l);
+    if (table->has("ptp4l") && !is_socket_path(scene.time.ptp4l))
+        table->fail("ptp4l", "expected the absolute path of a socket, of at most 107 characters");
+    table->read("ptp4l_domain", scene.time.ptp4l_domain);
     table->finish();
 }
 

@@ -77,12 +77,15 @@ TEST_F(SceneOnCan, RefusesSignalsThatAreNotThere) {
 
 TEST_F(SceneOnCan, ReadsClockAndBuses) {
     const auto scene = read("can_id = 0x110\n",
-                            "[time]\nsource = \"system\"\non_restart = \"new_run\"\n[can]\nsync_period_s = 0.1\n"
+                            "[time]\nsource = \"system\"\non_restart = \"new_run\"\nptp4l = \"/run/p\"\n"
+                            "ptp4l_domain = 24\n[can]\nsync_period_s = 0.1\n"
                             "time_period_s = 1\ntime_id = 0x200\nredundancy = \"cold\"\nheartbeat_id = 0x77f\n"
                             "heartbeat_timeout_s = 0.25\n");
     ASSERT_TRUE(scene) << scene.error().text();
     EXPECT_EQ(scene->time.source, TimeSettings::Source::system);
     EXPECT_EQ(scene->time.on_restart, TimeSettings::OnRestart::new_run);
+    EXPECT_EQ(scene->time.ptp4l, "/run/p");
+    EXPECT_EQ(scene->time.ptp4l_domain, 24);
     EXPECT_EQ(scene->can.sync_period_ns, 100'000'000);
     EXPECT_EQ(scene->can.time_period_ns, 1'000'000'000);
     EXPECT_EQ(scene->can.time_id, 0x200u);
@@ -100,6 +103,12 @@ TEST_F(SceneOnCan, RefusesWhatCollidesOrHasNoEffect) {
     expect_error(read("", "[can]\nheartbeat_id = 0x701\n"), "belongs to redundancy = \"cold\"");
     expect_error(read("", "[time]\nsource = \"gps\"\n"), "source");
     expect_error(read("", "[can]\nsync_period_s = 0\n"), "sync_period_s");
+    expect_error(read("", "[time]\nsource = \"system\"\nptp4l = \"ptp4l\"\n"), "expected the absolute path");
+    expect_error(read("", "[time]\nsource = \"system\"\nptp4l_domain = 256\n"), "ptp4l_domain");
+    const auto free = read("", "[time]\nptp4l = \"/run/ptp4l\"\n");
+    ASSERT_TRUE(free) << free.error().text();
+    ASSERT_EQ(free->warnings.size(), 1u);
+    EXPECT_NE(free->warnings[0].find("ptp4l of [time] has no effect"), std::string::npos);
 }
 
 }  // namespace

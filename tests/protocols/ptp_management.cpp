@@ -15,15 +15,15 @@ namespace {
 using test::ptp_answer;
 using test::PtpBytes;
 
-constexpr PtpPortIdentity kAsker{{0, 0, 0, 0, 0, 0, 0, 0}, 0x1234};
+constexpr PtpPortIdentity kPtpAsker{{0, 0, 0, 0, 0, 0, 0, 0}, 0x1234};
 
-PtpAnswer decode(const PtpBytes& bytes, PtpDataSet set, PtpStatus& status, std::uint16_t sequence = 7) {
-    return decode_ptp_answer(bytes, set, sequence, kAsker, status);
+PtpAnswer decode_with_asker(const PtpBytes& bytes, PtpDataSet set, PtpStatus& status, std::uint16_t sequence = 7) {
+    return decode_ptp_answer(bytes, set, sequence, kPtpAsker, status);
 }
 
 TEST(PtpManagement, AGetHasTheBytesOfTheStandard) {
     std::array<std::uint8_t, kPtpGetBytes> out{};
-    encode_ptp_get(PtpDataSet::time_properties, {.domain = 24, .transport_specific = 1}, 0x0102, kAsker, out);
+    encode_ptp_get(PtpDataSet::time_properties, {.domain = 24, .transport_specific = 1}, 0x0102, kPtpAsker, out);
     const PtpBytes expected{0x1D, 2,    0,    54,   24,   0,    0,    0,  // type, version, length, domain, flags
                             0,    0,    0,    0,    0,    0,    0,    0,    0,    0,
                             0,    0,                                                     // correction, reserved
@@ -37,23 +37,26 @@ TEST(PtpManagement, AGetHasTheBytesOfTheStandard) {
 
 TEST(PtpManagement, ReadsEachDataSet) {
     PtpStatus s;
-    EXPECT_EQ(decode(ptp_answer(7, kAsker, 0x2001, test::ptp_current(1, -1500, 250)), PtpDataSet::current, s),
+    EXPECT_EQ(decode_with_asker(ptp_answer(7, kPtpAsker, 0x2001, test::ptp_current(1, -1500, 250)),
+                                PtpDataSet::current, s),
               PtpAnswer::ok);
     EXPECT_EQ(s.steps_removed, 1);
     EXPECT_EQ(s.offset_ns, -1500);
     EXPECT_EQ(s.mean_path_delay_ns, 250);
-    EXPECT_EQ(decode(ptp_answer(7, kAsker, 0x2003, {0, 37, 0x3C, 0x20}), PtpDataSet::time_properties, s),
-              PtpAnswer::ok);
+    EXPECT_EQ(
+        decode_with_asker(ptp_answer(7, kPtpAsker, 0x2003, {0, 37, 0x3C, 0x20}), PtpDataSet::time_properties, s),
+        PtpAnswer::ok);
     EXPECT_EQ(s.tai_less_utc_s, 37);
     EXPECT_TRUE(s.tai_less_utc_valid);
     EXPECT_TRUE(s.ptp_timescale);
-    EXPECT_EQ(decode(ptp_answer(7, kAsker, 0x2004, test::ptp_port(1, 9)), PtpDataSet::port, s), PtpAnswer::ok);
+    EXPECT_EQ(decode_with_asker(ptp_answer(7, kPtpAsker, 0x2004, test::ptp_port(1, 9)), PtpDataSet::port, s),
+              PtpAnswer::ok);
     EXPECT_EQ(s.state, PtpPortState::slave);
     EXPECT_EQ(s.ports, 1);
     const PtpClockIdentity master{0x52, 0x54, 0, 0xFF, 0xFE, 0x12, 0x34, 0x56};
-    EXPECT_EQ(
-        decode(ptp_answer(7, kAsker, 0xC000, test::ptp_time_status(true, master)), PtpDataSet::time_status_np, s),
-        PtpAnswer::ok);
+    EXPECT_EQ(decode_with_asker(ptp_answer(7, kPtpAsker, 0xC000, test::ptp_time_status(true, master)),
+                                PtpDataSet::time_status_np, s),
+              PtpAnswer::ok);
     EXPECT_TRUE(s.grandmaster_present);
     EXPECT_EQ(s.grandmaster, master);
 }
@@ -73,12 +76,12 @@ TEST(PtpManagement, TheStateIsThatOfThePortWhichFollowsAMaster) {
 }
 
 TEST(PtpManagement, RefusesOtherAnswers) {
-    const PtpBytes good = ptp_answer(7, kAsker, 0x2003, {0, 37, 0x3C, 0x20});
+    const PtpBytes good = ptp_answer(7, kPtpAsker, 0x2003, {0, 37, 0x3C, 0x20});
     const auto with = [&](std::size_t at, std::uint8_t value) {
         PtpBytes bytes = good;
         bytes.at(at) = value;
         PtpStatus s;
-        const PtpAnswer answer = decode(bytes, PtpDataSet::time_properties, s);
+        const PtpAnswer answer = decode_with_asker(bytes, PtpDataSet::time_properties, s);
         EXPECT_FALSE(s.tai_less_utc_valid);
         return answer;
     };
@@ -94,35 +97,37 @@ TEST(PtpManagement, RefusesOtherAnswers) {
     EXPECT_EQ(with(53, 1), PtpAnswer::not_mine) << "another data set";
     EXPECT_EQ(with(49, 3), PtpAnswer::not_mine) << "another TLV";
     PtpStatus s;
-    EXPECT_EQ(decode(good, PtpDataSet::time_properties, s, 8), PtpAnswer::not_mine);
-    EXPECT_EQ(decode(test::ptp_error(7, kAsker, 0x2003), PtpDataSet::time_properties, s), PtpAnswer::refused);
-    EXPECT_EQ(decode(test::ptp_error(7, kAsker, 0x2001), PtpDataSet::time_properties, s), PtpAnswer::malformed);
+    EXPECT_EQ(decode_with_asker(good, PtpDataSet::time_properties, s, 8), PtpAnswer::not_mine);
+    EXPECT_EQ(decode_with_asker(test::ptp_error(7, kPtpAsker, 0x2003), PtpDataSet::time_properties, s),
+              PtpAnswer::refused);
+    EXPECT_EQ(decode_with_asker(test::ptp_error(7, kPtpAsker, 0x2001), PtpDataSet::time_properties, s),
+              PtpAnswer::malformed);
 }
 
 TEST(PtpManagement, EveryTruncationIsMalformed) {
     for (const PtpBytes& whole :
-         {ptp_answer(7, kAsker, 0x2003, {0, 37, 0x3C, 0x20}),
-          ptp_answer(7, kAsker, 0x2001, test::ptp_current(1, 2, 3)),
-          ptp_answer(7, kAsker, 0x2004, test::ptp_port(1, 9)), test::ptp_error(7, kAsker, 0x2003)})
+         {ptp_answer(7, kPtpAsker, 0x2003, {0, 37, 0x3C, 0x20}),
+          ptp_answer(7, kPtpAsker, 0x2001, test::ptp_current(1, 2, 3)),
+          ptp_answer(7, kPtpAsker, 0x2004, test::ptp_port(1, 9)), test::ptp_error(7, kPtpAsker, 0x2003)})
         for (std::size_t size = 0; size < whole.size(); ++size) {
             // A copy of its own size, so that the address sanitizer sees a read beyond it.
             const PtpBytes bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
             PtpStatus s;
             for (const PtpDataSet set : {PtpDataSet::current, PtpDataSet::time_properties, PtpDataSet::port})
-                EXPECT_EQ(decode(bytes, set, s), PtpAnswer::malformed) << size;
+                EXPECT_EQ(decode_with_asker(bytes, set, s), PtpAnswer::malformed) << size;
         }
 }
 
 TEST(PtpManagement, MutatedAnswersLeaveTheStatusOrChangeItsMembersOnly) {
     std::mt19937 random(5);
-    const PtpBytes good = ptp_answer(7, kAsker, 0xC000, test::ptp_time_status(true, {1, 2, 3, 4, 5, 6, 7, 8}));
+    const PtpBytes good = ptp_answer(7, kPtpAsker, 0xC000, test::ptp_time_status(true, {1, 2, 3, 4, 5, 6, 7, 8}));
     for (int trial = 0; trial < 20'000; ++trial) {
         PtpBytes bytes = good;
         bytes.resize(random() % (good.size() + 8));
         for (unsigned i = random() % 4; i > 0 && !bytes.empty(); --i)
             bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
         PtpStatus s;
-        const PtpAnswer answer = decode(bytes, PtpDataSet::time_status_np, s);
+        const PtpAnswer answer = decode_with_asker(bytes, PtpDataSet::time_status_np, s);
         EXPECT_EQ(s.ports, 0);
         EXPECT_TRUE(answer == PtpAnswer::ok || !s.grandmaster_present);
     }

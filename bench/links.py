@@ -1,17 +1,17 @@
 #!/usr/bin/python3
 """Frames from narpa in one network namespace to a receiver in another, joined by a veth pair: what came of what was sent, how long
-after the hand-over a frame was whole at the receiver, and what it cost of a processor. The frames are test patterns of 12 bits, so that
-rendering costs nothing and every pixel can be checked.
+after the hand-over a frame was whole at the receiver, and what it cost of a processor. The frames are test patterns of 12 bits:
+rendering costs nothing.
 
-    sudo unshare --net bench/links.py BIN_FOLDER [SECONDS]
+    sudo unshare --net bench/links.py BIN_FOLDER [SECONDS [check]]
 
-Receivers: udp: examples/frame_receiver in C; rtp: and tcp: the package narpa; gige: Aravis's client. Prints a table in Markdown."""
+Receivers: udp: examples/frame_receiver in C; rtp: and tcp: Python; gige: Aravis's client. Prints a table in Markdown. With `check` they
+are all in Python, and at a lower rate compare every pixel with the pattern; a frame with another pixel does not count as whole."""
 import csv
 import json
 import os
 import queue
 import re
-import resource
 import shutil
 import signal
 import socket
@@ -21,6 +21,8 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "python"))
@@ -42,12 +44,12 @@ fov_horizontal_deg = 40
 rate_hz = {rate}
 format = "{format}"
 embedded_line = {embedded}
-test_pattern = "prbs"
+test_pattern = "counter"
 detector = {{bits = 12, exposure_s = 0.001}}
 """
 SINKS = {  # sink, pixel format; frames of rtp: and gige: name themselves
     "udp": (f"udp:{THERE}:5004,mtu={MTU}", "Y12P", False),
-    "rtp": (f"rtp:{THERE}:5006,mtu={MTU},sdp={{folder}}/nav.sdp", "Y12", False),
+    "rtp": (f"rtp:{THERE}:5006,mtu={MTU},{{pace}}sdp={{folder}}/nav.sdp", "Y12", False),
     "tcp": (f"tcp:{HERE}:5008", "Y12", True),
     "gige": (f"gige:{HERE}", "Mono12p", False),
 }
@@ -73,13 +75,23 @@ def join_namespaces():
     return holder
 
 
+# Each gives, of each frame that ends: its number, whether it came whole, and what returns its pixels.
+
+
+def receive_udp(_):
+    from narpa import datagrams
+
+    for frame in datagrams.receive(5004):
+        yield frame.header.frame, frame.lost == 0, lambda: frame.pixels  # noqa: B023  (it is called before the next)
+
+
 def receive_rtp(sdp):
     from narpa import rtp
 
     while not Path(sdp).exists():
         time.sleep(0.05)
     for frame in rtp.receive(rtp.read_sdp(Path(sdp).read_text())):
-        print(f"{time.time_ns()} {frame.number} {int(frame.came.all())}", flush=True)
+        yield frame.number, frame.came.all(), lambda: frame.planes  # noqa: B023
 
 
 def receive_tcp(address):
@@ -94,7 +106,8 @@ def receive_tcp(address):
     width, height = map(int, re.search(rb" W(\d+) H(\d+) ", stream.readline()).groups())
     frame = bytearray(2 * width * height)
     while stream.readline() == b"FRAME\n" and stream.readinto(frame) == len(frame):
-        print(f"{time.time_ns()} {int.from_bytes(frame[-2 * width :][12:16], 'little')} 1", flush=True)
+        number = int.from_bytes(frame[-2 * width :][12:16], "little")  # by its embedded line
+        yield number, True, lambda: np.frombuffer(frame, "<u2").reshape(height, width)
 
 
 def receive_gige(_):
@@ -102,6 +115,7 @@ def receive_gige(_):
 
     gi.require_version("Aravis", "0.8")
     from gi.repository import Aravis
+    from narpa import pixels
 
     for _ in range(100):
         try:
@@ -113,20 +127,36 @@ def receive_gige(_):
     stream, payload = camera.create_stream(None, None), camera.get_payload()
     for _ in range(20):
         stream.push_buffer(Aravis.Buffer.new_allocate(payload))
+    _, _, width, height = camera.get_region()
     camera.start_acquisition()
     while True:
         buffer = stream.timeout_pop_buffer(2_000_000)
         if buffer is None:
             continue
-        good = buffer.get_status() == Aravis.BufferStatus.SUCCESS
-        print(f"{time.time_ns()} {buffer.get_frame_id() - 1} {int(good)}", flush=True)
+        whole = buffer.get_status() == Aravis.BufferStatus.SUCCESS
+        yield buffer.get_frame_id() - 1, whole, lambda: pixels.array("Mono12p", width, height, bytes(buffer.get_data()))  # noqa: B023
         stream.push_buffer(buffer)
 
 
+def is_pattern(number, pixels, name):
+    same = pixels == ((np.arange(pixels.size) + number) % 4096).reshape(pixels.shape)
+    if name == "tcp":  # its embedded line
+        same[-1, :80] = True
+    return same.all()
+
+
+def receive(name, where, checks):
+    """Prints time, number and whether it came whole of each frame."""
+    for number, whole, pixels in {"udp": receive_udp, "rtp": receive_rtp, "tcp": receive_tcp, "gige": receive_gige}[name](where):
+        now = time.time_ns()
+        print(now, number, int(whole and (not checks or is_pattern(number, pixels(), name))), flush=True)
+
+
 def receiver_of(name, folder):
-    if name == "udp":
+    if name == "udp" and not CHECKS:
         return [folder / "receive", "5004"]
-    return [sys.executable, __file__, "receive", name, {"rtp": folder / "nav.sdp", "tcp": f"{HERE}:5008"}.get(name, "")]
+    where = {"rtp": folder / "nav.sdp", "tcp": f"{HERE}:5008"}.get(name, "")
+    return [sys.executable, __file__, "receive", name, where, *(["check"] if CHECKS else [])]
 
 
 def cpu_s(process):
@@ -161,7 +191,8 @@ def run(name, size, rate, seconds, narpa, folder):
         reader = threading.Thread(target=read)
         reader.start()
         time.sleep(1)
-    emulator = subprocess.Popen([str(c) for c in (narpa, "run", scene, "--video", f"nav={sink.format(folder=folder)}", "--duration", seconds,
+    video = "nav=" + sink.format(folder=folder, pace="mbit_s=300," if CHECKS else "")  # Python is slow
+    emulator = subprocess.Popen([str(c) for c in (narpa, "run", scene, "--video", video, "--duration", seconds,
                                  "--threads", "1", "--log", log, "--json")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
     out, err = queue.Queue(), []
     threading.Thread(target=lambda: out.put(emulator.stdout.read()), daemon=True).start()
@@ -189,7 +220,7 @@ def main():
     folder = Path(tempfile.mkdtemp(prefix="narpa-links-"))
     subprocess.run(["cc", "-O2", "-o", folder / "receive", ROOT / "examples/frame_receiver/receive.c"], check=True)
     print("| frames | sink | sent | whole | latency p50, p99 (ms) | processor, a frame: narpa, receiver (ms) |\n|---|---|---|---|---|---|")
-    for size, rate in (((640, 480), 10), ((2048, 1536), 5)):
+    for size, rate in (((640, 480), 2), ((2048, 1536), 0.5)) if CHECKS else (((640, 480), 10), ((2048, 1536), 5)):
         base = run("none", size, rate, seconds, narpa, folder)
         for name in SINKS:
             r = run(name, size, rate, seconds, narpa, folder)
@@ -199,10 +230,10 @@ def main():
     shutil.rmtree(folder)
 
 
+CHECKS = sys.argv[-1] == "check"
 if sys.argv[1:2] == ["receive"]:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    {"rtp": receive_rtp, "tcp": receive_tcp, "gige": receive_gige}[sys.argv[2]](sys.argv[3])
+    receive(sys.argv[2], sys.argv[3], CHECKS)
 else:
     HOLDER = join_namespaces()
     try:

@@ -306,11 +306,11 @@ TEST_F(ReplayTest, ErrorsOfALogNamePlaceAndCause) {
     bad_cell("deadline_met", "yes", "deadline_met: \"yes\", expected 0 or 1");
     bad_cell("image_crc32", "12345", "image_crc32: \"12345\", expected 8 hexadecimal digits");
     bad_cell("binning", "0", "binning: \"0\", expected a whole number from 1 to 255");
-    bad_cell("trigger", "often", "trigger: \"often\", expected free_running, command or sync");
+    bad_cell("trigger", "often", "trigger: \"often\", expected free_running, command, sync or external");
     bad_cell("region_x", "70000", "region_x: \"70000\", expected a whole number");
     bad_cell("t_exposure_mid_ns", "100000001", "nav.ledger.csv:3:1: frame 1 at 100000001 ns: ");
     std::ofstream(ledger) << good_ledger << "3,0\n";
-    expect_refused(log, "nav.ledger.csv:5:1: 2 columns, expected 32");
+    expect_refused(log, "nav.ledger.csv:5:1: 2 columns, expected 34");
     std::ofstream(ledger) << "hello\n";
     expect_refused(log, "nav.ledger.csv:1:1: expected the header line");
     std::filesystem::remove(ledger);

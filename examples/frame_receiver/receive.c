@@ -60,10 +60,10 @@ static void *grown(void *old, size_t *room, size_t bytes) {
 static void end_frame(struct frame *f, const char *pattern) {
     if (!f->begun) return;
     f->begun = 0;
-    const int big_endian = f->format[3] & 0x80; /* V4L2's mark */
-    printf("frame %" PRIu32 ": %" PRIu32 " x %" PRIu32 " %.3s%c%s, t = %.6f s, %" PRIu32 " of %" PRIu32
+    const char last = (char)(f->format[3] & 0x7F); /* the bit above is V4L2's mark of big-endian formats */
+    printf("frame %" PRIu32 ": %" PRIu32 " x %" PRIu32 " %.3s%.*s%s, t = %.6f s, %" PRIu32 " of %" PRIu32
            " datagrams lost\n",
-           f->number, f->width, f->height, f->format, f->format[3] & 0x7F, big_endian ? "-BE" : "", 1e-9 * (double)f->t_ns, f->count - f->came, f->count);
+           f->number, f->width, f->height, f->format, last != ' ', &last, f->format[3] & 0x80 ? "-BE" : "", 1e-9 * (double)f->t_ns, f->count - f->came, f->count);
     fflush(stdout);
     if (pattern == NULL) return;
     const char *at = strstr(pattern, "%u");

@@ -9,6 +9,7 @@ Receivers: udp: examples/frame_receiver in C; rtp: and tcp: Python; gige: Aravis
 are all in Python, and at a lower rate compare every pixel with the pattern; a frame with another pixel does not count as whole."""
 import csv
 import json
+import math
 import os
 import queue
 import re
@@ -65,7 +66,10 @@ def join_namespaces():
     holder = subprocess.Popen(["unshare", "--net", "sleep", "infinity"])
     while os.readlink(f"/proc/{holder.pid}/ns/net") == os.readlink("/proc/self/ns/net"):
         time.sleep(0.01)
-    def ip(*words): subprocess.run(["ip", *words], check=True)  # noqa: E704
+
+    def ip(*words):
+        subprocess.run(["ip", *words], check=True)
+
     ip("link", "set", "lo", "up")
     ip("link", "add", "v0", "mtu", str(MTU), "type", "veth", "peer", "name", "v1", "mtu", str(MTU), "netns", str(holder.pid))
     ip("addr", "add", f"{HERE}/24", "dev", "v0")
@@ -167,8 +171,9 @@ def cpu_s(process):
 
 
 def percentile(values, p):
+    """By nearest rank."""
     values = sorted(values)
-    return values[min(len(values) - 1, int(p * len(values)))] if values else float("nan")
+    return values[math.ceil(p * len(values)) - 1] if values else float("nan")
 
 
 def run(name, size, rate, seconds, narpa, folder):
